@@ -66,8 +66,8 @@ def verified(seed: int = 1) -> Verified:
     )
     for task in (FIXED_POINT, PART):
         choices = VerificationChoices(task.kind, plan)
-        conditions = Conditions(instrument, cone_cam=scene.cone_cam)
-        setup, state = SessionSetup(conditions, choices), SessionState()
+        setup = SessionSetup(Conditions(instrument), choices)
+        state = SessionState()
         while state.done is None and clock.now_ns() < GIVE_UP * 1e9:
             probing_operator.follow(setup, state)
             frame = camera.read(1.0)

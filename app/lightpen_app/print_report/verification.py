@@ -212,7 +212,7 @@ ELSEWHERE = {
     *("program", "created", "verification", "verdict", "session", "station"),
     *("operator", "pen", "tip", "origin", "inputs", "records", "checksum"),
     *("temperature_c", "humidity_percent", "camera_serials"),
-    *("touches", "left_out", "rejected", "witness", "images", "covariance"),
+    *("touches", "left_out", "rejected", "images", "covariance"),
 }
 DECIMALS = 4  # of a length in mm
 N_DIGITS = 6  # of another number

@@ -17,7 +17,7 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.state_banner import State, StatusMessage, status_text
+from lightpen_app.widgets.state_banner import State, status_text
 from lightpen_app_extensions.measure.check_list import CheckRow, value_text
 from lightpen_app_extensions.measure.part_view import FigureValue, posture_value
 from lightpen_app_extensions.measure.service import MeasureService
@@ -55,8 +55,6 @@ class VerifyView:
 
     headline: Headline = field(default_factory=Headline)
     operator: OperatorValue = field(default_factory=OperatorValue)
-    # The drift of fixed lamps, unless it is the verdict.
-    lamps: StatusMessage = field(default_factory=StatusMessage)
     rows: tuple[CheckRow, ...] = ()  # checks, or features of a part
     current: int = 0  # row of what is probed now
     task: AnyTask | None = None  # the current one
@@ -72,14 +70,6 @@ def is_held(state: SessionState) -> bool:
     touching = state.touching
     is_holding = touching.phase is ProbingPhase.HOLDING
     return is_holding and len(touching.held) >= SETTLING
-
-
-def lamps_message(status: VerificationStatus) -> StatusMessage:
-    """Return the drift of fixed lamps, unless it is the verdict."""
-    assessment = None if status.lamp_drift is None else status.lamp_drift.assessment
-    if assessment is None or (status.is_done and assessment is status.assessment):
-        return StatusMessage()
-    return StatusMessage(worded(assessment.reason), *GRADE_MARKS[assessment.grade])
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +101,6 @@ class VerifyPresenter(QObject):
         return VerifyView(
             headline=headline,
             operator=self.operator_value(),
-            lamps=lamps_message(status),
             rows=self.rows(),
             current=self.current_row(),
             task=None if status.refusal is not None else status.task,

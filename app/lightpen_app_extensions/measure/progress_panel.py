@@ -29,7 +29,7 @@ from lightpen_app.widgets.fitting import (
     PageScroll,
     ResponsiveLayout,
 )
-from lightpen_app.widgets.state_banner import SignLabel, StateBanner
+from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.presenter import VerifyView
@@ -80,7 +80,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(STATE_HEIGHT)
-        self._lamps = SignLabel()
         self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
         self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
@@ -96,7 +95,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
         self._row = horizontal_layout(self._buttons, *buttons, 1)
-        fill(layout, self._lamps)
         self._use_room()
 
         # Connections
@@ -121,7 +119,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._hint.set_text(operator.hint, bold=False)
         self._banner.set_value(operator.state)
         self._count.set_text(operator.count)
-        self._lamps.set_value(view.lamps)
         self._numbers.setVisible(operator.fraction is not None)
         self._progress.setValue(round(PROGRESS_STEPS * (operator.fraction or 0.0)))
         self._act.setText(view.pause)

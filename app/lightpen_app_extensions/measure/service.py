@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
 from lightpen.archive.chains import Event
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.folder import VERIFIED
 from lightpen_app.face import (
     DemoStep,
@@ -33,6 +32,7 @@ from lightpen_extensions.measure.storage.session_record import (
     InterruptedVerification,
     find_interrupted,
 )
+from lightpen_extensions.measure.tasks.drift import DRIFT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.registry import ALL_TASKS, task_of
 from lightpen_extensions.measure.tasks.task import VerificationChoices
@@ -169,11 +169,12 @@ class MeasureService(Service):
         return self.measuring.status.is_done
 
     def _reference_message(self) -> StatusMessage:
-        drift = self.verification.status.lamp_drift
+        state = self.verification.status.state
+        drift = None if state is None else state.found_by(DRIFT)
         if drift is None:
             text = translate("DayPage", "No drift reference")
             return StatusMessage(text, Sign.RING, Tone.QUIET)
-        if drift.assessment.grade is not Grade.PASS:
+        if not drift.assessment.is_accepted:
             text = translate("DayPage", "The camera moved. Verify the tip.")
             return StatusMessage.warning(text)
         return StatusMessage.good(translate("DayPage", "Drift reference stable"))

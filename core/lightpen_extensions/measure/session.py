@@ -8,8 +8,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pixel_box import RegionOfInterest
@@ -18,7 +16,6 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
-from lightpen_extensions.measure.probing.drift_reference import LampDrift, judged_with
 from lightpen_extensions.measure.probing.probing import (
     ProbingEvent,
     ProbingEventKind,
@@ -79,14 +76,6 @@ class SessionSetup:
         turn, distance = self.task.newness
         n_frames = self.task.n_frames(self.choices)
         return ProbingRules(n_frames, min_turn=turn, min_distance=distance)
-
-
-def with_drift(setup: SessionSetup, reference: LampDrift | None) -> SessionSetup:
-    """Return the conditions with the camera drift measured by lamps."""
-    if reference is None:
-        return setup
-    drift = np.maximum(setup.conditions.drift, reference.share)
-    return replace(setup, conditions=replace(setup.conditions, drift=drift))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +197,6 @@ def setup_of(tip: CurrentTip, choices: VerificationChoices) -> SessionSetup:
         choices.limits,
         tip.names.ball_diameter,
         nominal_tip=tip.nominal_tip,
-        cone_cam=tip.cone_cam,
     )
     return SessionSetup(conditions, choices)
 
@@ -372,7 +360,6 @@ class VerificationStatus:
     began: datetime | None = None  # when its first image came
     files: tuple[Path, ...] = ()  # results
     reading: ReadingState = ReadingState.NOTHING
-    lamp_drift: LampDrift | None = None  # up to the end of the task
     is_here: bool = False  # an operator is present
     is_paused: bool = False
     accepted_by: str = ""  # supervisor, despite findings
@@ -398,9 +385,9 @@ class VerificationStatus:
 
     @property
     def assessment(self) -> VerificationAssessment | None:
-        """What was found; a drift first, as it explains the rest."""
+        """What was found."""
         found = None if self.state is None else self.state.found
-        return None if found is None else judged_with(found.assessment, self.lamp_drift)
+        return None if found is None else found.assessment
 
 
 class VerificationListener(Protocol):

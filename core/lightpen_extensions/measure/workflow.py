@@ -33,7 +33,6 @@ from lightpen_extensions.measure.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
 )
-from lightpen_extensions.measure.probing.drift_reference import LampObservations
 from lightpen_extensions.measure.session import (
     ReadingState,
     SessionEventKind,
@@ -49,7 +48,6 @@ from lightpen_extensions.measure.session import (
     without_last_touch,
 )
 from lightpen_extensions.measure.storage.resuming import (
-    LivePoints,
     ResumedVerification,
     resume_verification,
 )
@@ -96,7 +94,6 @@ class VerificationWorkflow:
         self._preparation: Preparation | None = None
         self._choices = VerificationChoices()
         self._keeping = SessionKeeping(data, self._begin_record, now)
-        self._live = LivePoints()
         self._faults = FaultReporter(listener)
         self._task = BackgroundTask(start, self.recover, listener.on_progress)
 
@@ -226,8 +223,6 @@ class VerificationWorkflow:
 
     def _on_gone_on(self, path: Path, before: ResumedVerification) -> None:
         self._give_up()
-        self._live.begin(before.lamps)
-        lamp_drift = self._live.lamp_drift(before.setup)
         try:
             self._keeping.take_over(path, before)
         except FileError as error:
@@ -243,7 +238,6 @@ class VerificationWorkflow:
                 region=before.tip.region,
                 began=before.under_way.began,
                 files=before.files,
-                lamp_drift=lamp_drift,
                 is_here=self._status.is_here,
                 refusal=self._why_not(before.tip),
             )
@@ -275,11 +269,9 @@ class VerificationWorkflow:
         assert state is not None
         if status.began is None:
             self._status = replace(status, began=self._now())
-            self._live.begin(LampObservations())
         try:
-            transition = self._live.take(
-                self._keeping.images, setup, state, frame, detection, region
-            )
+            images = self._keeping.images
+            transition = images.take(setup, state, frame, detection)
         except FileError as error:  # an image that is not kept does not count
             self._faults.report(error.message, Cause.IMAGES)
             return
@@ -304,12 +296,10 @@ class VerificationWorkflow:
         return make_record_folder(touches, tip.names, header.created), header
 
     def _become(self, transition: SessionTransition) -> None:
-        before, setup = self._status.state, self._status.setup
+        before = self._status.state
         self._status = replace(self._status, state=transition.state)
         happened = event_kinds(before, transition)
-        if transition.finished is not None and setup is not None:
-            lamp_drift = self._live.lamp_drift(setup)
-            self._status = replace(self._status, lamp_drift=lamp_drift)
+        if transition.finished is not None:
             happened.append(ending(self._status))
             self._conclude()
         self._publish(self._status, *happened)

@@ -5572,10 +5572,6 @@ needed</source>
         <translation>平均值</translation>
     </message>
     <message>
-        <source>Average - calibrated cone</source>
-        <translation>平均值 - 标定的锥孔</translation>
-    </message>
-    <message>
         <source>Both halves of the swing fit alone, but not together: the residuals are {times:.0f} times larger. Lock zoom, focus and image stabilisation, clamp camera and cone, and repeat the swing.</source>
         <translation>摆动的前后两半各自符合模型，合在一起却不符合：残差为原来的 {times:.0f} 倍。请锁定变焦、对焦和防抖，夹紧相机和锥孔，然后重新摆动。</translation>
     </message>
@@ -6182,10 +6178,6 @@ needed</source>
     <message>
         <source>The base of the rig file and the scale of the LED file contradict each other: the pen is {wanted:.6g} ± {wanted_u:.2g} times as large by the rig, 1 ± {stated_u:.2g} by its file (k = 2). Either file may be wrong. Check that both belong together, then measure the pen or calibrate the rig again.</source>
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
-    </message>
-    <message>
-        <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
-        <translation>相机稳定：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
@@ -8214,10 +8206,6 @@ needed</source>
     <message>
         <source>Standard deviation {axis}</source>
         <translation>标准偏差 {axis}</translation>
-    </message>
-    <message>
-        <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>
-        <translation>相机移动了 {shift:.1f} px：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测点的 U 已计入该偏移。</translation>
     </message>
     <message>
         <source>The camera moved during the swing: fixed lamps in view and the pen shifted by {shift:.2f} px. The result is corrected. Clamp the camera and let it warm up.</source>

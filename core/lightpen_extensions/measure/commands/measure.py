@@ -41,7 +41,6 @@ from lightpen_extensions.measure.commands.touched import (
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
 from lightpen_extensions.measure.measuring.report import EXPORTS
-from lightpen_extensions.measure.probing.drift_reference import judged_with
 from lightpen_extensions.measure.reports import found_text, touches_text
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.probed_point import point_entries
@@ -116,7 +115,6 @@ def _measure_points(given: argparse.Namespace) -> int:
     measured = measure_runs(given, images, centers)
     touches = [touch for run in measured.runs for touch in run.touches]
     print(shown(touches_text(touches, measured.instrument, measured.rejected)))
-    measured.print_lamp_drift()
     if given.json is not None:
         entries = {"touches": point_entries(touches, measured.instrument)}
         rule = rule_in_words(measured.conditions.limits)
@@ -156,7 +154,7 @@ def _measured(
         conditions = replace(conditions, ball_diameter=ball)
     choices = VerificationChoices(PART.kind, plan)
     found = PART.measure(runs, conditions, choices)
-    judged = judged_with(found.assessment, measured.lamp_drift)
+    judged = found.assessment
     tables = PART.tables(found, conditions)
     rule = rule_of(choices, conditions.limits)
     remarks = conditions.instrument.remarks
@@ -376,14 +374,13 @@ def _concluded(
     tables: Sequence[ResultTable],
 ) -> int:
     """Print, keep and return what was found."""
-    judged = judged_with(found.assessment, measured.lamp_drift)
+    judged = found.assessment
     if judged.is_accepted and measured.n_of_calibration:
         n_own = measured.n_of_calibration
         judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
     rule = rule_in_words(measured.conditions.limits)
     remarks = measured.instrument.remarks
     print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
-    measured.print_lamp_drift(judged)
     entries = task.entries(found, measured.instrument)
     record = measured.record(given, task.kind, entries, judged, rule)
     keep_record(given, record, measured.calibration, measured.origin)

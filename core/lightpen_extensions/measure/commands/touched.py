@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpen.commands.arguments import add_bits, add_cameras_and_pen
-from lightpen.commands.console import (
-    centers_at,
-    lacking,
-    progress,
-    require_other_file,
-    shown,
-)
+from lightpen.commands.console import centers_at, lacking, progress, require_other_file
 from lightpen.commands.entering import limits_in_force
 from lightpen.comparisons.assessment import VerificationAssessment, read_drift
 from lightpen.comparisons.records import verification_record
@@ -32,12 +26,6 @@ from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
 from lightpen.record.folder import conditions_entries
-from lightpen_extensions.measure.probing.current_tip import cone_before
-from lightpen_extensions.measure.probing.drift_reference import (
-    LampDrift,
-    LampObservations,
-    lamp_drift_entries,
-)
 from lightpen_extensions.measure.probing.probing import (
     FAST,
     ONE_IMAGE,
@@ -52,7 +40,6 @@ from lightpen_extensions.measure.probing.sources import (
     RecordedConditions,
     RecordedTouch,
     instrument_of,
-    lamp_drift_of,
     observe_place,
     read_viewers,
     touch_place,
@@ -122,7 +109,6 @@ class MeasuredRuns:
     files: tuple[Path, ...]
     viewers: PenCameras
     pen_file: Path
-    lamp_drift: LampDrift | None
     recorded: RecordedConditions | None  # if the images are of a record
 
     @property
@@ -151,12 +137,6 @@ class MeasuredRuns:
         own = {each.sha256 for each in self.calibration.calibration.inputs.observations}
         return sum(each.sha256 in own for each in self.hashed_files)
 
-    def print_lamp_drift(self, judged: VerificationAssessment | None = None) -> None:
-        """Print the drift of fixed lamps, unless it is the verdict."""
-        drift = None if self.lamp_drift is None else self.lamp_drift.assessment
-        if drift is not None and drift is not judged:
-            print(shown(str(drift.reason)))
-
     def record(
         self,
         options: argparse.Namespace,
@@ -174,7 +154,6 @@ class MeasuredRuns:
                 **self._conditions(),
                 **entries,
                 "rejected": rejected_entries(self.rejected),
-                "witness": lamp_drift_entries(self.lamp_drift),
             },
             assessment,
             {
@@ -251,7 +230,6 @@ def measure_runs(
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
     limits = limits_in_force(options, calibration)
-    lamp_drift = lamp_drift_of(runs, instrument, limits)
     moved = NO_DRIFT if drift is None else read_drift(drift)
     return MeasuredRuns(
         calibration=calibration,
@@ -262,14 +240,12 @@ def measure_runs(
             ball_diameter=options.ball_diameter,
             ball_uncertainty=getattr(options, "ball_uncertainty", BALL_UNCERTAINTY),
             nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
-            cone_cam=cone_before(calibration, viewers),
-            drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
+            drift=moved,
         ),
         runs=tuple(runs),
         files=files,
         viewers=viewers,
         pen_file=pen_file,
-        lamp_drift=lamp_drift,
         recorded=recorded,
     )
 
@@ -346,8 +322,7 @@ def _parted(
             each if each.run == number else replace(each, number=0)
             for each in seen.touches or ()
         ]
-        found = touches_of(seen.name, seen.views, instrument, rules, own)
-        runs.append(replace(found, lamps=LampObservations()) if runs else found)
+        runs.append(touches_of(seen.name, seen.views, instrument, rules, own))
     return runs
 
 

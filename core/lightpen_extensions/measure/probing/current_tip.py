@@ -33,7 +33,6 @@ class CurrentTip:
     calibration: CalibrationFile
     instrument: Instrument
     nominal_tip: FloatArray | None  # (3,), mm
-    cone_cam: FloatArray | None  # (3,), mm; None before another camera
     masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
     viewers: PenCameras
     tip_file: InputFile
@@ -98,7 +97,6 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         calibration=calibration,
         instrument=instrument,
         nominal_tip=nominal_tip,
-        cone_cam=cone_before(calibration, viewers),
         masks=tuple(map(preparation.mask_of, range(viewers.rig.n_cameras))),
         viewers=viewers,
         tip_file=hashed(file),
@@ -107,12 +105,6 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         humidity_percent=today.humidity_percent,
         bending=bending,
     )
-
-
-def cone_before(calibration: CalibrationFile, viewers: PenCameras) -> FloatArray | None:
-    """Return the cone of the calibration, (3,), mm; None for other cameras."""
-    is_same = viewers.hashes == calibration.camera_hashes
-    return calibration.cone_cam if is_same else None
 
 
 def _viewers(preparation: Preparation) -> PenCameras | None:

@@ -31,7 +31,7 @@ from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.messages import Message, message, printable
 from lightpen.model.bending import ASSUMED_BENDING, Bending
 from lightpen.model.camera import Camera
-from lightpen.model.limits import Assumptions, VerificationLimits
+from lightpen.model.limits import Assumptions
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rig_of
@@ -44,11 +44,6 @@ from lightpen.record.swings.reading import (
     recorded_origin,
 )
 from lightpen.record.swings.solving import RecordSource, is_simulated_recording, source
-from lightpen_extensions.measure.probing.drift_reference import (
-    LampDrift,
-    LampObservations,
-    lamps_in,
-)
 from lightpen_extensions.measure.probing.probing import (
     ProbingRules,
     take_all,
@@ -206,22 +201,11 @@ MAX_RMS = 1.0  # px; LED errors of 0.3 mm make this
 
 @dataclass(frozen=True, eq=False)
 class ProbingRun:
-    """The touches of one run, images that belong to none, and all their lamps."""
+    """The touches of one run, and images that belong to none."""
 
     name: str
     touches: tuple[ProbedPoint, ...]
     rejected: tuple[RejectedFrame, ...]
-    lamps: LampObservations
-
-
-def lamp_drift_of(
-    runs: Sequence[ProbingRun], instrument: Instrument, limits: VerificationLimits
-) -> LampDrift | None:
-    """Return the drift of fixed lamps over runs in the order of time."""
-    lamps = LampObservations()
-    for run in runs:
-        lamps = lamps.then(run.lamps)
-    return lamps.lamp_drift(instrument.rig.cameras, limits)
 
 
 def instrument_of(
@@ -362,7 +346,7 @@ def touches_of(
         for image, detection in images
         if not detection.has_pose and image not in named
     )
-    return ProbingRun(name, touches, rejected, lamps_in(seen))
+    return ProbingRun(name, touches, rejected)
 
 
 def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:

@@ -42,7 +42,6 @@ from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
-from lightpen_extensions.measure.probing.drift_reference import lamp_drift_entries
 from lightpen_extensions.measure.probing.sources import PenCameras
 from lightpen_extensions.measure.session import SessionSetup, VerificationStatus
 from lightpen_extensions.measure.storage.resuming import ResumedVerification
@@ -147,7 +146,6 @@ def task_record(
             **conditions_entries(tip.temperature_c, tip.humidity_percent),
             **task.entries(state.found, tip.instrument),
             "rejected": [],
-            "witness": lamp_drift_entries(status.lamp_drift),
         },
         state.found.assessment,
         {name: limits[name] for name in task.limits},

@@ -20,6 +20,7 @@ from msgspec import Struct, to_builtins
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.rig_observations import see_together
 from lightpen.errors import FileError
 from lightpen.formats.files import (
     LARGEST_RECORD,
@@ -48,8 +49,17 @@ from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Header, Names
 from lightpen.record.swings.reading import JOURNAL, image_name, open_record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView, is_locked
-from lightpen_extensions.measure.probing.probing import ProbingEventKind, ProbingPhase
-from lightpen_extensions.measure.session import SessionState, SessionTransition
+from lightpen_extensions.measure.probing.probing import (
+    ProbingEventKind,
+    ProbingPhase,
+    approach_of,
+)
+from lightpen_extensions.measure.session import (
+    SessionSetup,
+    SessionState,
+    SessionTransition,
+    advance_session,
+)
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 
 SESSION, DAMAGED = "session.json", ".damaged"
@@ -120,6 +130,28 @@ class SessionRecord:
             return []
         digest = hashed(self._folder / JOURNAL).sha256
         return [{"folder": self._folder.name, "journal_sha256": digest}]
+
+    def take(
+        self,
+        setup: SessionSetup,
+        state: SessionState,
+        frame: Frame,
+        detection: PenDetection,
+    ) -> SessionTransition:
+        """Process an image and return the transition of the verification.
+
+        An image of a point is put on the disk before it counts.
+        """
+        touching, rules, instrument = state.touching, setup.rules, setup.instrument
+        seen = see_together(instrument.rig, instrument.pen, detection)
+        name, is_holding = str(frame.seq), touching.phase is ProbingPhase.HOLDING
+        may_count = is_holding and len(touching.held) >= rules.n_settling
+        if may_count and seen.has_pose and not seen.is_blurred:
+            tip_cam = seen.rotation @ instrument.tip_pen + seen.translation
+            name = self.keep(frame, seen, approach_of(touching, tip_cam))
+        transition = advance_session(setup, state, name, seen)
+        self.follow(state, transition)
+        return transition
 
     def keep(
         self, frame: Frame, seen: PenDetection, approach: FloatArray | None = None

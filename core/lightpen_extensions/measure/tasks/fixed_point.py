@@ -88,7 +88,6 @@ class FixedPoint(Found):
     expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
     half_range_uncertainty: FloatArray  # (3,): 95 % of the half ranges by noise, mm
     tip: TipEvidence
-    moved: FloatArray | None  # (3,), mean less the calibration's cone, mm
 
     @property
     def probed(self) -> tuple[ProbedPoint, ...]:
@@ -103,7 +102,7 @@ def measure_fixed_point(
 
     Raises `CalibrationError` if there are too few points at one place.
     """
-    instrument, cone_cam = conditions.instrument.seated, conditions.cone_cam
+    instrument = conditions.instrument.seated
     touches = [point.seated for _, points in runs for point in points]
     kept, left_out = _at_one_place(touches)
     calibrated = scatter_of(kept)
@@ -122,7 +121,6 @@ def measure_fixed_point(
         expected_deviation=expected,
         half_range_uncertainty=_half_range_by_noise(covariance),
         tip=points_evidence(kept, instrument, conditions.drift),
-        moved=None if cone_cam is None else calibrated.mean - cone_cam,
         assessment=accepted(_steady(calibrated)),
     )
     return replace(found, assessment=_assessment(found, conditions.limits))
@@ -265,7 +263,6 @@ def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
         "expected_std_mm": found.expected_deviation,
         "half_range_mm": found.calibrated.half_range,
         "half_range_expanded_uncertainty_mm": found.half_range_uncertainty,
-        "moved_mm": found.moved,
         **tip_entries(found.tip),
         "touches": point_entries(found.touches, instrument.seated),
         "left_out": point_entries(found.left_out, instrument.seated),
@@ -289,8 +286,6 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
         ResultRow(message("table.uncertainty"), found.half_range_uncertainty.tolist()),
         ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
     ]
-    if found.moved is not None:
-        own.append(ResultRow(message("fixed-point.moved"), found.moved.tolist()))
     change = [
         ResultRow(message("fixed-point.tip-change"), found.tip.change.tolist()),
         ResultRow(

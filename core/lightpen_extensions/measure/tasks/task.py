@@ -56,7 +56,6 @@ class Conditions:
     ball_diameter: float | None = None  # mm; if a surface is touched
     ball_uncertainty: float = BALL_UNCERTAINTY  # U (k = 2) of the diameter, mm
     nominal_tip: FloatArray | None = None  # (3,), mm, to compare with
-    cone_cam: FloatArray | None = None  # (3,), of the calibration, if known, mm
     # (3,), standard uncertainty of a point by a camera that moved, mm
     drift: FloatArray = field(default_factory=NO_DRIFT.copy)
 

@@ -1,33 +1,19 @@
 """A verification from the tip in force to its verdict, and what is kept of it."""
 
 import json
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import replace
 from queue import SimpleQueue
 
 import numpy as np
 import pytest
 from tests.accepted_tip import Holder, accept_tip, leant, round_a_ring
-from tests.verifying import (
-    BAR,
-    CHOICES,
-    NOON,
-    PART_CHOICES,
-    TIMEOUT,
-    Verifier,
-    found_by,
-)
+from tests.verifying import BAR, CHOICES, NOON, PART_CHOICES, TIMEOUT, Verifier
 
 from lightpen.archive.checks import check_archive
 from lightpen.archive.logbook import Logbook
-from lightpen.cameras.pairing import SkippingClock
-from lightpen.cameras.protocol import CameraSettings
 from lightpen.comparisons.assessment import read_scale
-from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.pixel_box import RegionOfInterest
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
@@ -41,17 +27,11 @@ from lightpen.record.swings.reading import (
     open_record,
 )
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
-from lightpen_extensions.measure.storage.session_record import (
-    CONCLUDED,
-    find_interrupted,
-)
+from lightpen_extensions.measure.session import SessionEventKind
+from lightpen_extensions.measure.storage.session_record import CONCLUDED
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import VerificationChoices
-from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
 EVE = Signature("Eve", "correct horse")
@@ -316,115 +296,6 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
     at_it.touch(leant(4)[2])
     assert at_it.ear.reliefs
     assert len(at_it.status.state.touches) == 1
-
-
-# A camera that moves
-
-
-WITH_LAMP = VerificationChoices(n_cone=3, n_cone_frames=8, n_frames=8)
-
-
-def touch_before_lamp(
-    verifier: Verifier, camera: SimulatedCamera, n_touches: int = 3
-) -> VerificationStatus:
-    """Have the simulated operator touch a cone, as often as said."""
-    probing_operator, seen = ProbingOperator(camera.operator), None
-    while verifier.status.task is not None:
-        status = verifier.status
-        assert status.setup is not None
-        assert status.state is not None
-        assert status.region is not None
-        assert status.region.camera is not None
-        assert status.region.pen is not None
-        if len(status.state.touches) == n_touches:
-            break
-        probing_operator.follow(status.setup, status.state)
-        frame = camera.read(1.0)
-        assert frame.seq < 1000  # of which the touches take a tenth
-        seen = detect_pen(
-            frame.image, status.region.camera, status.region.pen, None, seen
-        )
-        verifier.runner.take(frame, seen, status.region)
-    return verifier.status
-
-
-@pytest.fixture
-def lit_by(verifier: Verifier) -> Iterator[Callable[[float], SimulatedCamera]]:
-    """Return a function that makes a camera with a lamp in view, which turns.
-
-    It turns by so many px a minute, of which the touches take a tenth or so.
-    """
-    with ExitStack() as stack:
-
-        def camera_turning(turn: float) -> SimulatedCamera:
-            own = verifier.preparation.camera
-            assert own is not None
-            scene = Scene(camera=own, has_lamp=True, camera_turn=turn)
-            camera = SimulatedCamera(scene, SkippingClock())
-            camera.open()
-            stack.callback(camera.close)
-            camera.configure(CameraSettings(frame_rate=10.0))
-            camera.start()
-            return camera
-
-        yield camera_turning
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("turn", [0.0, 3.0])
-def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
-    verifier: Verifier, lit_by: Callable[[float], SimulatedCamera], turn: float
-) -> None:
-    accept_tip(verifier.folder, verifier.preparation)
-    verifier.come(WITH_LAMP)
-    status = touch_before_lamp(verifier, lit_by(turn))
-
-    witness = status.lamp_drift
-    assert witness is not None
-    assert status.assessment is not None
-    assert status.state is not None
-    assert status.state.done is FIXED_POINT
-    (record,) = verifier.records
-    assert record["witness"]["moved_mm"] == witness.moved
-    U = found_by(status.state, FIXED_POINT).uncertainty
-    assert U[0] >= 2 * witness.share[0]
-    if turn:
-        assert status.assessment.reason.code == "witness.moved"
-        assert 0.02 < witness.moved < 0.3
-    else:
-        # Its few points may not verify the tip, but nothing moved.
-        assert status.assessment.reason.code in {"tip.weak-power", "tip.with-power"}
-        assert witness.assessment.grade is Grade.STEADY
-        assert witness.moved < 0.006
-
-
-@pytest.mark.slow
-def test_a_lamp_is_watched_on_after_an_interruption(
-    verifier: Verifier,
-    lit_by: Callable[[float], SimulatedCamera],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> None:
-    accept_tip(verifier.folder, verifier.preparation)
-    verifier.come(WITH_LAMP)
-    camera = lit_by(3.0)
-    assert touch_before_lamp(verifier, camera, 2).lamp_drift is None
-    copy = tmp_path_factory.mktemp("killed") / "data"
-    shutil.copytree(verifier.folder, copy)
-    second = Verifier(copy, verifier.preparation)
-    second.runner.ask(lambda workflow: workflow.choose(second.preparation, WITH_LAMP))
-    second.runner.ask(lambda workflow: workflow.go_on(*find_interrupted(copy)))
-    second.runner.ask(lambda workflow: workflow.come())
-    second.ear.wait_until(lambda: second.status.began is not None)
-    status = touch_before_lamp(second, camera)
-    second.runner.shut_down()
-    assert second.runner.await_end(TIMEOUT)
-
-    # The images of the last touch alone are too few to tell.
-    assert status.lamp_drift is not None
-    assert status.assessment is not None
-    assert status.assessment.reason.code == "witness.moved"
-    (record,) = second.records
-    assert record["witness"]["moved_mm"] == status.lamp_drift.moved
 
 
 # What became of it

@@ -9,12 +9,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from tests.accepted_tip import Hold, Holder, accept_tip, leant, round_a_ring
-from tests.verifying import BAR, CHOICES, FRAME, NOON, PART_CHOICES, TABLE, found_by
+from tests.verifying import BAR, CHOICES, FRAME, NOON, PART_CHOICES, TABLE
 
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
@@ -27,10 +26,6 @@ from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.runners import Act, Report, T, Task
 from lightpen.swing.preparation import Preparation, SourceChoice
-from lightpen_extensions.measure.probing.drift_reference import (
-    LampImages,
-    LampObservations,
-)
 from lightpen_extensions.measure.probing.sources import touch_place
 from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
@@ -321,29 +316,3 @@ def test_the_images_of_touches_say_which_touch_they_are_of(trace: Trace) -> None
 
     # A touch that is taken back counts no more; its number is not given again.
     assert [each.number for each in touches] == [1, 1, 1, 0, 0, 0, 3, 3, 3]
-
-
-def test_a_camera_that_turns_before_lamps_counts_in_what_is_touched_then(
-    trace: Trace,
-) -> None:
-    seen: list[Any] = []
-    for shift in (0.0, 5.0):  # px, in the middle
-        trace.workflow.start_over()
-        trace.come(replace(CHOICES, kind=FIXED_POINT.kind))
-        trace.pick_up()
-        trace.touch(leant(4)[0])
-        lights = [np.array([[100.0 + shift * (i >= 24), 50.0]]) for i in range(48)]
-        lamps = LampImages(tuple(lights), (1000.0,) * 48)
-        trace.workflow._live.begin(LampObservations((lamps,)))
-        trace.touch(*leant(4)[1:])
-        state = trace.workflow.status.state
-        assert state is not None
-        seen.append((trace.workflow.status, found_by(state, FIXED_POINT).uncertainty))
-    trace.workflow.shut_down()
-    (_, still), (status, moved) = seen
-
-    assert status.lamp_drift is not None
-    assert status.lamp_drift.share[0] > 0.1
-    np.testing.assert_allclose(
-        moved, np.hypot(still, 2 * status.lamp_drift.share), rtol=0.05
-    )

@@ -54,7 +54,6 @@ def test_the_instrument_is_that_of_the_swing(
     np.testing.assert_array_equal(one.tip_pen, tip.calibration.tip_pen)
     assert one.sigma == tip.calibration.calibration.sigma_px
     assert one.rig.covariance is None
-    np.testing.assert_array_equal(tip.cone_cam, tip.calibration.cone_cam)
     assert (tip.temperature_c, tip.humidity_percent) == (21.5, None)
     assert tip.region.mask is chosen.mask
     assert tip.region.others == ()
@@ -113,7 +112,7 @@ def other_camera(prepared: Preparation, folder: Path) -> CameraFile:
     return CameraFile.read(path)
 
 
-def test_before_another_camera_its_file_counts_and_the_cone_is_not_known(
+def test_before_another_camera_its_file_counts(
     tmp_path: Path, prepared: Preparation
 ) -> None:
     accept_tip(tmp_path, prepared)
@@ -122,7 +121,6 @@ def test_before_another_camera_its_file_counts_and_the_cone_is_not_known(
     tip = read(tmp_path, replace(prepared, camera_file=file))
     at, known = tip.instrument.parameters, usual.instrument.covariance
 
-    assert tip.cone_cam is None
     np.testing.assert_array_equal(
         tip.instrument.camera.intrinsics, file.camera.intrinsics
     )

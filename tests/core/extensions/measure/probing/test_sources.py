@@ -8,28 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.accepted_tip import Hold, Holder
-from tests.verifying import FRAME
 
-from lightpen.arrays import FloatArray
-from lightpen.cameras.protocol import Frame
 from lightpen.detection.observations import Observations, observe_centers
-from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.measure.probing.drift_reference import (
-    LampImages,
-    LampObservations,
-    lamps_in,
-)
 from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
 from lightpen_extensions.measure.probing.sources import (
     ImageLocation,
     ProbingRun,
     RecordedTouch,
-    lamp_drift_of,
     observe_place,
     require_leds_fit,
     touches_of,
@@ -161,56 +151,3 @@ def test_a_moment_has_the_name_of_its_first_image() -> None:
     )
 
     assert named(found) == [("right 1.png",), ("left 2.png",)]
-
-
-def test_lamps_are_those_of_images_that_show_the_pen(instrument: Instrument) -> None:
-    seen = observed(instrument, [0.0, None, 30.0])
-    lamps = np.array([[[1.0, 2.0], [np.nan] * 2], [[5.0, 6.0]] * 2, [[3.0, 4.0]] * 2])
-    (found,) = lamps_in([replace(seen, lamps=lamps)]).cameras
-
-    assert [each.tolist() for each in found.lights] == [[[1, 2]], [[3, 4], [3, 4]]]
-    assert found.distances == (seen.translations[0, 2], seen.translations[2, 2])
-
-
-def test_each_camera_of_a_rig_has_its_own_lamps() -> None:
-    pen, rig = paper_pen(), beside(paper_camera(), PAPER_CONE)
-    holder = Holder(rig, pen)
-    both = next(holder.still(Hold()))
-    (lost,) = holder.away(1)
-    one, other = (RegionOfInterest(camera, pen) for camera in rig.cameras)
-    region = replace(one, others=(other,))
-    frame = replace(FRAME, others=(FRAME,))
-
-    def distances(
-        frame: Frame, *views: Any, region: RegionOfInterest = region
-    ) -> list[tuple[float, ...]]:
-        seen = replace(views[0], others=views[1:])
-        found = LampObservations().with_frame(frame, seen, region)
-        assert all(len(each.lights) == len(each.distances) for each in found.cameras)
-        assert all(not light.size for each in found.cameras for light in each.lights)
-        return [each.distances for each in found.cameras]
-
-    near, far = both.translation[2], both.others[0].translation[2]
-    assert distances(frame, both, both.others[0]) == [(near,), (far,)]
-    assert distances(frame, both, lost) == [(near,), ()]
-    assert distances(frame, lost, both.others[0]) == [(), (far,)]
-    assert distances(FRAME, both) == [(near,), ()]
-    assert distances(FRAME, both, region=one) == [(near,)]
-
-
-def test_lamps_of_runs_are_taken_in_the_order_of_time(instrument: Instrument) -> None:
-    def shown(n: int, x: float) -> ProbingRun:
-        lights: tuple[FloatArray, ...] = (np.array([[x, 100.0]]),) * n
-        images = LampImages(lights, (1000.0,) * n)
-        return ProbingRun("", (), (), LampObservations((images,)))
-
-    scale = 1000.0 / instrument.camera.fx
-    runs = shown(16, 300.0), shown(8, 310.0)
-    there = lamp_drift_of(runs, instrument, LIMITS)
-    back = lamp_drift_of(runs[::-1], instrument, LIMITS)
-
-    assert there is not None
-    assert back is not None
-    np.testing.assert_allclose(there.moves[:, 0], scale * np.array([0, 0, 10.0]))
-    np.testing.assert_allclose(back.moves[:, 0], scale * np.array([0, -10.0, -10.0]))
-    assert lamp_drift_of((), instrument, LIMITS) is None

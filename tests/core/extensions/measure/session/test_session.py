@@ -60,7 +60,7 @@ def test_a_simulated_operator_completes_a_task_without_a_key(
         rig_of(scene.camera), pen, scene.tip_pen, 1e-6 * np.eye(3), 0.01
     )
     choices = replace(CHOICES, kind=task.kind, n_frames=2)
-    setup = SessionSetup(Conditions(instrument, cone_cam=scene.cone_cam), choices)
+    setup = SessionSetup(Conditions(instrument), choices)
     clock = SkippingClock()
     camera = SimulatedCamera(scene, clock)
     camera.open()

@@ -29,8 +29,7 @@ def test_a_right_tip_is_accepted(instrument: Instrument, touching: Touching) -> 
     touches = touching(np.tile(PAPER_CONE, (10, 1)))
 
     found = measure_fixed_point(
-        [("", touches)],
-        Conditions(instrument, LIMITS, nominal_tip=NOMINAL_TIP, cone_cam=PAPER_CONE),
+        [("", touches)], Conditions(instrument, LIMITS, nominal_tip=NOMINAL_TIP)
     )
 
     assert found.assessment.grade is Grade.PASS

@@ -100,7 +100,7 @@ def cone(
     scatter = Scatter(np.outer([0.0, np.sqrt(2)], deviation))
     return fixed_point.FixedPoint(
         *(accepted(REASON), touches, (), scatter, None, np.zeros(3)),
-        *(np.full(3, expected), np.zeros(3), tip, None),
+        *(np.full(3, expected), np.zeros(3), tip),
     )
 
 
