@@ -588,16 +588,24 @@ def walker(open_wizard: OpenWizard) -> Walker:
     return open_wizard()
 
 
-HoldBack = Callable[..., Event]
+class HeldBack(Event):
+    """Has a function begin once it is set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_reached = Event()  # the function was called
+
+
+HoldBack = Callable[..., HeldBack]
 
 
 @pytest.fixture
 def hold_back(monkeypatch: pytest.MonkeyPatch) -> Iterator[HoldBack]:
     """Return a function that has others, by their places, begin once that is set."""
-    held: list[Event] = []
+    held: list[HeldBack] = []
 
-    def hold(*places: str) -> Event:
-        may_begin = Event()
+    def hold(*places: str) -> HeldBack:
+        may_begin = HeldBack()
         held.append(may_begin)
         for place in places:
             monkeypatch.setattr(place, _once_set(may_begin, resolve_name(place)))
@@ -608,8 +616,9 @@ def hold_back(monkeypatch: pytest.MonkeyPatch) -> Iterator[HoldBack]:
         may_begin.set()
 
 
-def _once_set(may_begin: Event, function: Callable[..., Any]) -> Callable[..., Any]:
+def _once_set(may_begin: HeldBack, function: Callable[..., Any]) -> Callable[..., Any]:
     def held(*arguments: Any) -> Any:
+        may_begin.is_reached.set()
         may_begin.wait()
         return function(*arguments)
 

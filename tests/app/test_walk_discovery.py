@@ -66,9 +66,9 @@ def find_and_accept(walker: "Walker", step: str) -> None:
     (pen,) = window.findChildren(PenView)
     walker.until(lambda: len(pen.value().marked) == 2)  # by the images so far
     if step == "Camera":  # without it the tip needs all images
-        walker.until(lambda: bool(walker.names(begin) & {"Start"}))
-    elif walker.names(begin) & {"Stop"}:  # else it has all images already
-        walker.click_on(begin)
+        walker.until(begin.isEnabled)
+    elif not begin.isEnabled():  # else it has all images already
+        walker.click_on(walker.control("Stop", window))
 
     leds = scene_of(walker.workbench.around).pen.leds
     length = window.findChildren(NumberField)[0].value()

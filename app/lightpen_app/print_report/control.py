@@ -37,14 +37,16 @@ from lightpen.record.swings.header import Names
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.print_report.pages import A4, PrintReport, paint_on, pdf_of
+from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.controls import ask_file
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.chosen_files import SavePlace
-from lightpen_app.work.job import Job, LatestJob
+from lightpen_app.work.job import Job, LatestJob, Report
 
 T = TypeVar("T")
+PATIENCE_MS = 300  # before the progress of saving is shown
 
 
 @dataclass(frozen=True)
@@ -191,10 +193,11 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._save = self.make_button(self.tr("Save as PDF..."), self._ask_file)
         self._print = self.make_button(self.tr("Print..."), self._ask_printer)
         self._close = self.make_button(self.tr("Close"))
-        self._said = SignLabel()
+        self._said, self._progress = SignLabel(), JobProgress(PATIENCE_MS)
 
         # Layout
-        layout = vertical_layout(self, (self._pages, 1), self._said, margins=GRID)
+        shown = (self._pages, 1), self._progress, self._said
+        layout = vertical_layout(self, *shown, margins=GRID)
         zoom = self._smaller, self._larger
         horizontal_layout(layout, *zoom, 1, self._print, self._save, self._close)
 
@@ -227,11 +230,21 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def write(self, path: Path) -> None:
         """Save it as PDF in a file."""
+        report = self._report
         self._place.remember(path.parent)
-        pdf = pdf_of(self._report)
-        self._saving = job = Job(lambda _: write_whole(path, pdf), self)
+
+        def save(progress: Report) -> None:
+            write_whole(path, pdf_of(report, progress))
+
+        self._saving = job = Job(save, self)
+        self._progress.cancelled.connect(job.cancel)
+        self._progress.begin()
+        self._save.setEnabled(False)
         job.start(
-            lambda _: self.saved.emit(path), self.failed, ended=self._on_saving_ended
+            lambda _: self.saved.emit(path),
+            self.failed,
+            progressed=self._progress.set_fraction,
+            ended=self._on_saving_ended,
         )
 
     def _on_saved(self, path: Path) -> None:
@@ -243,6 +256,8 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def _on_saving_ended(self) -> None:
         self._saving = None
+        self._progress.end()
+        self._save.setEnabled(True)
         if self.isHidden():
             self.deleteLater()
 

@@ -1,6 +1,6 @@
 """Page layout of a report: position of blocks, header and footer."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QMarginsF, QRectF
@@ -196,8 +196,10 @@ def print_report_of(
     )
 
 
-def pdf_of(report: PrintReport) -> bytes:
-    """Return pages as PDF/A-1b."""
+def pdf_of(
+    report: PrintReport, progress: Callable[[float], None] = lambda fraction: None
+) -> bytes:
+    """Return pages as PDF/A-1b; ``progress`` is called as in `paint_on`."""
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     writer = QPdfWriter(buffer)
@@ -206,22 +208,32 @@ def pdf_of(report: PrintReport) -> bytes:
     writer.setTitle(f"{report.margins.title}, {report.margins.subject}")
     writer.setAuthor(report.author)
     writer.setCreator("Lightpen")
-    paint_on(report, writer)
+    paint_on(report, writer, progress)
     buffer.close()
     return bytes(buffer.data().data()).replace(CMYK, IN_ITS_PLACE)
 
 
-def paint_on(report: PrintReport, device: QPagedPaintDevice) -> None:
-    """Draw all pages on a device that has pages, such as a printer."""
+def paint_on(
+    report: PrintReport,
+    device: QPagedPaintDevice,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> None:
+    """Draw all pages on a device that has pages, such as a printer.
+
+    ``progress`` is called with the fraction done, 0 to 1; what it raises ends the work.
+    """
     device.setPageLayout(A4)
     painter = QPainter(device)
     times = device.logicalDpiX() / DOTS_AN_INCH
     painter.scale(times, times)
-    for number in range(1, report.n_pages + 1):
-        if number > 1:
-            device.newPage()
-        paint_page(report, number, painter)
-    painter.end()
+    try:
+        for number in range(1, report.n_pages + 1):
+            if number > 1:
+                device.newPage()
+            paint_page(report, number, painter)
+            progress(number / report.n_pages)
+    finally:
+        painter.end()
 
 
 def report_stem(calibration_file: CalibrationFile) -> str:

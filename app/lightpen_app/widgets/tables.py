@@ -34,6 +34,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, set_size
+from lightpen_app.look.words import plain_tooltip
 from lightpen_app.widgets.fields import Translated
 
 Index = QModelIndex | QPersistentModelIndex
@@ -110,6 +111,7 @@ class RowTable(QTableView):
 
 
 NUMBER_ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
+WIDEST_NAME = 28 * GRID  # px, of a row; a longer one loses its end
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,8 @@ class NumberTable(QTableWidget):
         across.setDefaultAlignment(RIGHT)
         across.setHighlightSections(False)
         down.setDefaultAlignment(LEFT)
+        down.setTextElideMode(Qt.TextElideMode.ElideRight)
+        down.setMaximumWidth(WIDEST_NAME)
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         down.setHighlightSections(False)
         self.set_letters(TextSize.BODY)
@@ -171,6 +175,8 @@ class NumberTable(QTableWidget):
         self.setColumnCount(len(value.columns))
         self.setHorizontalHeaderLabels(value.columns)
         self.setVerticalHeaderLabels(value.rows)
+        for i, name in enumerate(value.rows):
+            self.verticalHeaderItem(i).setToolTip(plain_tooltip(name))
         for i, row in enumerate(value.cells):
             for j, text in enumerate(row):
                 item = QTableWidgetItem(text)
@@ -186,7 +192,8 @@ class NumberTable(QTableWidget):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        width = sum(self._needed()) + self.verticalHeader().sizeHint().width()
+        names = min(self.verticalHeader().sizeHint().width(), WIDEST_NAME)
+        width = sum(self._needed()) + names
         return QSize(max(width, 20 * GRID), self.sizeHint().height())
 
     def _needed(self) -> list[int]:

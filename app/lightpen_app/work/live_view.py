@@ -295,7 +295,15 @@ class LiveView(QObject):
     @property
     def why_no_images(self) -> str:
         """Why the camera was lost, or could not be opened; empty while images come."""
-        return self._notifications.text((self, self._chosen, WITHOUT_IMAGES))
+        return self._why_without(self._chosen)
+
+    def has_failed(self, camera: int) -> bool:
+        """Return whether a camera, by its number from 0, could not be opened."""
+        is_closed = (
+            camera < self.n_cameras
+            and self._states[camera].connection is Connection.CLOSED
+        )
+        return is_closed and bool(self._why_without(camera))
 
     @property
     def serial(self) -> str:
@@ -422,6 +430,9 @@ class LiveView(QObject):
         if self.n_cameras > 1:
             words = self.tr("Camera {0}: {1}").format(camera + 1, words)
         return words
+
+    def _why_without(self, camera: int) -> str:
+        return self._notifications.text((self, camera, WITHOUT_IMAGES))
 
     def _withdraw(self, camera: int) -> None:
         self._notifications.withdraw((self, camera, WITHOUT_IMAGES))

@@ -64,7 +64,9 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._image = BoardView()
         self._instruction, self._progress = SignLabel(), JobProgress()
         self._count = text_label(TextSize.BODY)
-        self._begin = PushButton()
+        # Two buttons: a click on Stop as the capture ends by itself starts no other.
+        self._begin = self.make_button(self.tr("Start"), self._run.start)
+        self._stop = self.make_button(self.tr("Stop"), self._run.stop)
         self._dial = PostureDial()
         self._pen = PenView()
         self._how = text_label(TextSize.BODY)
@@ -80,8 +82,9 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
         # Layout
         panel = QWidget()
-        side = vertical_layout(panel, self._begin, self._count, margins=None)
-        fill(side, self._dial, self._pen, self._how)
+        side = vertical_layout(panel, margins=None)
+        horizontal_layout(side, (self._begin, 1), (self._stop, 1))
+        fill(side, self._count, self._dial, self._pen, self._how)
         grid = grid_layout(side, spacing=(GRID, GRID // 2))
         fields = (self._length, self._u, self._disc)
         for row, (name, edit) in enumerate(zip(self._names, fields, strict=True)):
@@ -112,7 +115,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._run.changed.connect(self._refresh)
         self._run.found_changed.connect(self._show_found)
         self._run.saved.connect(self._on_saved)
-        self._begin.clicked.connect(self._on_begin_clicked)
         self._compute.clicked.connect(self._on_compute_clicked)
         self._progress.cancelled.connect(self._run.cancel)
         self._save.clicked.connect(self._run.save)
@@ -135,12 +137,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _on_image_shown(self, shown: DisplayedImage) -> None:
         if self.isVisible() and not self._run.state.is_final:
             self._image.set_half(shown.half, shown.size, live_markers(shown.seen))
-
-    def _on_begin_clicked(self) -> None:
-        if self._run.state.is_capturing:
-            self._run.stop()
-        else:
-            self._run.start()
 
     def _on_led_chosen(self, led: int) -> None:
         """Take the first LED as origin of the pen's frame, the second along y."""
@@ -180,7 +176,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
     def _refresh(self) -> None:
         state = self._run.state
-        self._begin.setText(self.tr("Stop") if state.is_capturing else self.tr("Start"))
+        self._begin.setEnabled(not state.is_capturing)
+        self._stop.setEnabled(state.is_capturing)
         n_wanted = max(N_USUAL, state.n_images)
         words = self.tr("Images: {0} of {1}").format(state.n_images, n_wanted)
         self._count.setText(words)

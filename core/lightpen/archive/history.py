@@ -4,7 +4,8 @@ import json
 import os
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
@@ -364,26 +365,40 @@ def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[i
 FORMAT = 1
 
 
-def export_entries(database: Database, path: Path) -> int:
-    """Write all entries of an archive to a new file; return their number."""
+Report = Callable[[float], None]
+
+
+def export_entries(
+    database: Database, path: Path, report: Report = lambda fraction: None
+) -> int:
+    """Write all entries of an archive to a new file; return their number.
+
+    ``report`` is called with the fraction done, 0 to 1; what it raises ends the work.
+    Only a whole file stays.
+    """
     n_entries, checksum = 0, sha256()
-    try:
-        with path.open("xb") as stream:
-            for content in _contents(database):
-                line = _entry_line(content)
-                stream.write(line)
-                checksum.update(line)
-                n_entries += "entry" in content
-            end = {"n_entries": n_entries, "sha256": checksum.hexdigest()}
-            stream.write(_entry_line(end))
-            stream.flush()
-            os.fsync(stream.fileno())
-    except FileExistsError as error:
-        raise NameTakenError("archive.export-exists", file=path) from error
-    except OSError as error:
-        raise FileError(
-            "archive.not-exported", file=path, reason=strerror(error)
-        ) from error
+    n_all = n_wanted(database, EntryFilter())
+    with ExitStack() as undo:
+        try:
+            with path.open("xb") as stream:
+                undo.callback(path.unlink, missing_ok=True)
+                for content in _contents(database):
+                    line = _entry_line(content)
+                    stream.write(line)
+                    checksum.update(line)
+                    n_entries += "entry" in content
+                    report(min(1.0, n_entries / max(n_all, 1)))
+                end = {"n_entries": n_entries, "sha256": checksum.hexdigest()}
+                stream.write(_entry_line(end))
+                stream.flush()
+                os.fsync(stream.fileno())
+        except FileExistsError as error:
+            raise NameTakenError("archive.export-exists", file=path) from error
+        except OSError as error:
+            raise FileError(
+                "archive.not-exported", file=path, reason=strerror(error)
+            ) from error
+        undo.pop_all()
     return n_entries
 
 
@@ -414,9 +429,20 @@ COLUMNS = (
 BATCH = 1000  # entries that are read at one time
 
 
-def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
-    """Write the entries of a filter as a table, newest first; return their number."""
-    entries = tuple(_all(database, wanted))
+def save_entries(
+    database: Database,
+    wanted: EntryFilter,
+    path: Path,
+    report: Report = lambda fraction: None,
+) -> int:
+    """Write the entries of a filter as a table, newest first; return their number.
+
+    ``report`` is called with the fraction done, 0 to 1; what it raises ends the work.
+    """
+    n_all, entries = n_wanted(database, wanted), []
+    for entry in _all(database, wanted):
+        entries.append(entry)
+        report(min(1.0, len(entries) / max(n_all, 1)))
     write_whole(path, entries_csv(entries).encode("utf-8", "backslashreplace"))
     return len(entries)
 

@@ -107,7 +107,7 @@ def improve_pen(
     again = []
     for n, calibration in enumerate(calibrations, start=1):
         again.append(calibrate_again(calibration, known_camera, known_pen))
-        report(n / len(calibrations))
+        report(n / (len(calibrations) + 1))
     *others, confirming = again
     joint = _pooled(others, known_camera, known_pen, scale)
     improved, refined = joint.pen, joint.camera
@@ -127,6 +127,7 @@ def improve_pen(
             after=after.sigma,
         )
     marks = [marks_of(shown_images(each.calibration).pixels) for each in pooled]
+    report(1.0)
     return ImprovedPen(
         pen=replace(improved, found=_with_marks(pen.found, marks)),
         camera=replace(refined, found=_with_marks(camera.found, marks)),

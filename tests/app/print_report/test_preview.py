@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Event, current_thread, main_thread
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt, QThreadPool
@@ -10,10 +12,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QGraphicsView, QPushButton
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
+from tests.app.patience import PATIENCE_MS
 
 from lightpen.record.results.results import Result
 from lightpen_app.print_report.control import PrintReportWindow
-from lightpen_app.print_report.pages import PrintReport, paint_on
+from lightpen_app.print_report.pages import PrintReport, paint_on, paint_page
+from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
 
@@ -51,16 +55,17 @@ def said(window: PrintReportWindow) -> str:
     return label.value().text
 
 
+def _save_button(window: PrintReportWindow) -> QPushButton:
+    buttons = window.findChildren(QPushButton)
+    (button,) = (each for each in buttons if each.text() == "Save as PDF...")
+    return button
+
+
 def test_it_is_saved_where_it_is_wanted(
     qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
 ) -> None:
     path = tmp_path / "record.pdf"
-    (button,) = (
-        each
-        for each in window.findChildren(QPushButton)
-        if each.text() == "Save as PDF..."
-    )
-    button.click()
+    _save_button(window).click()
     (dialog,) = window.findChildren(QFileDialog)
 
     with qtbot.waitSignal(window.saved) as saved:
@@ -105,4 +110,45 @@ def test_a_window_that_is_closed_while_it_saves_saves_all_the_same(
         window.write(path)
         window.close()
 
+    assert path.read_bytes().startswith(b"%PDF-1.4")
+
+
+def test_saving_that_is_cancelled_leaves_the_file_as_it_was(
+    qtbot: QtBot,
+    window: PrintReportWindow,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    painted, may_go_on = Event(), Event()
+
+    def paint_slowly(*arguments: Any) -> None:
+        paint_page(*arguments)
+        if current_thread() is not main_thread():
+            painted.set()
+            may_go_on.wait()
+
+    monkeypatch.setattr("lightpen_app.print_report.pages.paint_page", paint_slowly)
+    path = tmp_path / "saved" / "record.pdf"
+    path.parent.mkdir()
+    path.write_text("as before")
+    reported: list[object] = []
+    window.saved.connect(reported.append)
+    window.failed.connect(reported.append)
+    (progress,) = window.findChildren(JobProgress)
+    window.write(path)
+    assert painted.wait(PATIENCE_MS / 1000)
+
+    qtbot.waitUntil(progress.isVisible)
+    (cancel,) = progress.findChildren(QPushButton)
+    cancel.click()
+    may_go_on.set()
+    save = _save_button(window)
+    qtbot.waitUntil(save.isEnabled)
+
+    assert not progress.isVisible()
+    assert [each.name for each in path.parent.iterdir()] == ["record.pdf"]
+    assert path.read_text() == "as before"
+    assert (reported, said(window)) == ([], "")
+    with qtbot.waitSignal(window.saved):
+        window.write(path)
     assert path.read_bytes().startswith(b"%PDF-1.4")

@@ -162,6 +162,7 @@ class CameraPage(Page):
         self._view.images.set_cameras(self._live.n_cameras, self._live.chosen)
         if connection is Connection.LOST:
             self._on_lost()
+        self._show_connection()
         self.changed.emit()
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:
@@ -210,7 +211,8 @@ class CameraPage(Page):
         connection, why = self._live.connection, self._live.why_no_images
         is_live = connection is Connection.STREAMING
         self._view.images.set_connection(connection, why or self._why_closed())
-        self._view.source.set_faulty(connection is Connection.CLOSED and bool(why))
+        for camera, panel in enumerate((self._view.source, self._view.second.source)):
+            panel.set_faulty(self._live.has_failed(camera))
         self._view.stray_light.set_live(is_live)
         self._view.stray_light.set_has_operator(self._live.operator is not None)
         caps = self._live.caps if is_live else None

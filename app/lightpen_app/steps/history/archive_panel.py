@@ -231,11 +231,11 @@ class ArchiveControl(QObject):
         logbook, wanted = self._logbook, self._filter.value()
         self._place.remember(path.parent)
 
-        def save(_: Report) -> int:
+        def save(report: Report) -> int:
             database = logbook.opened().database
             if saving is SaveFormat.WHOLE:
-                return export_entries(database, path)
-            return save_entries(database, wanted, path)
+                return export_entries(database, path, report)
+            return save_entries(database, wanted, path, report)
 
         text = self.tr("{0} entries saved in {1}")
         self._do(

@@ -34,6 +34,7 @@ from lightpen_app.widgets.tables import RIGHT, ROW_HEIGHT, Index, RowTable, Titl
 
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
 NUMBERS = (X, Y, Z, U)
+FIGURES = (WHEN, *NUMBERS)  # never cut
 NAMED = {  # shortest and longest names that are shown whole
     STATION: ("Hall 12", 12 * "n"),
     PEN: ("LP-0000", 12 * "n"),
@@ -43,6 +44,7 @@ NAMED = {  # shortest and longest names that are shown whole
 MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
 CELL_MARGIN = 18  # px, beside the words
 LEAST_WORDS = 8 * GRID  # px, of the last column
+LEAST_SHARE = 0.8  # of the width of words that is left where there is no room
 LEAST_ROWS = 3
 MOST_BLOCKS = 40  # that are kept
 MOST_SELECTED = 1000  # lines that are compared
@@ -260,8 +262,8 @@ class HistoryTable(Translated, RowTable):
     def _share_width(self) -> None:
         """Give each column its minimum, and share the rest up to the maximum.
 
-        Where not even that fits, the letters are smaller, and no column shows the
-        station where there is only one.
+        Where not even that fits, the letters are smaller, no column shows the station
+        where there is only one, and then words lose their end.
         """
         room = self.viewport().width() - LEAST_WORDS
         body, small = (
@@ -278,6 +280,12 @@ class HistoryTable(Translated, RowTable):
         for column in range(WORDS):
             self.setColumnHidden(column, column in hidden)
         least, most = (self._widths(letters, longer, hidden) for longer in (0, 1))
+        words = {c: width for c, width in least.items() if c not in FIGURES}
+        lack = (sum(least.values()) - room) / max(sum(words.values()), 1)
+        if lack > 0:
+            shown = max(1 - lack, LEAST_SHARE)
+            least |= {column: int(shown * width) for column, width in words.items()}
+            most = least
         wanted = {column: most[column] - least[column] for column in least}
         spare = room - sum(least.values())
         share = min(max(spare / max(sum(wanted.values()), 1), 0.0), 1.0)

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
+from tests.app.room import scrolled_sideways
 from typing_extensions import override
 
 from lightpen.archive.chains import Event, Kind
@@ -130,6 +131,7 @@ class Desk:
         tip: str = "T-10",
         first: int = 0,
         origin: Origin | None = None,
+        of: Names | None = None,
     ) -> None:
         """Enter tips of which the x is their number, in mm."""
         logbook = self.workbench.run.logbook.opened()
@@ -137,7 +139,7 @@ class Desk:
             event = Event(
                 kind=Kind.ACCEPTED,
                 at=NOON + timedelta(days=n),
-                names=names(tip),
+                names=of or names(tip),
                 program="lightpen 1",
                 grade=Grade.PASS,
                 tip_pen_mm=(float(n), 0.0, -1.5),
@@ -470,8 +472,16 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "2 calibrations do not suffice for a verdict" in said_in(panel)
 
 
+def files_in(folder: Path) -> dict[Path, int]:
+    """Return the files in a folder with their sizes."""
+    found = (each for each in folder.rglob("*") if each.is_file())
+    return {each: each.stat().st_size for each in found}
+
+
 @pytest.mark.slow
-def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> None:
+def test_several_swings_are_adjusted_together(
+    desk: Desk, tmp_path: Path, hold_back: "HoldBack"
+) -> None:
     folder, scene = desk.workbench.folder, Scene(camera=paper_camera(binning=2))
     files = write_sample_files(scene, tmp_path / "files")
     prepared = Preparation(
@@ -493,12 +503,18 @@ def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> Non
     assert remark.value().text == "To adjust together, select 3 or more calibrations."
     desk.select(0, 1, 2)
     assert not remark.value().text
-    desk.click("Adjust together")
-    desk.click("Cancel")
-    QThreadPool.globalInstance().waitForDone()
-    QApplication.processEvents()
-    assert not remark.value().text
-    assert not list(folder.rglob("led files/*"))
+    before = files_in(folder)
+    for begins_at in "calibrate_again", "_pooled":  # a swing; all together, the longest
+        may_begin = hold_back(f"lightpen.comparisons.led_file.{begins_at}")
+        desk.click("Adjust together")
+        desk.until(may_begin.is_reached.is_set)
+        desk.click("Cancel")
+        may_begin.set()
+        QThreadPool.globalInstance().waitForDone()
+        QApplication.processEvents()
+        assert not remark.value().text
+        assert not panel.adjusting.is_running
+        assert files_in(folder) == before
 
     desk.click("Adjust together")
     desk.until(lambda: "Residuals of the swing held out" in remark.value().text)
@@ -712,6 +728,34 @@ def test_what_is_not_accepted_has_no_record_on_paper(desk: Desk) -> None:
     }
 
 
+LONG = 200 * "W"
+
+
+def test_long_names_are_not_scrolled_sideways_in_a_small_window(desk: Desk) -> None:
+    desk.enter(2, of=Names("Hall 2", LONG, LONG, LONG, LONG))
+    desk.open()
+    desk.page.resize(710, 540)  # that of a window of 800 x 600
+    for tab in TRENDS, ENTRY, SELECTION, DUE, WHOLE:
+        desk.show_tab(tab)
+        QApplication.processEvents()
+        assert scrolled_sideways(desk.page) == ()
+
+
+@pytest.mark.slow
+def test_the_station_and_long_names_fit_at_the_usual_width(
+    desk: Desk, qapp: QApplication
+) -> None:
+    apply_theme(qapp, LIGHT)
+    for station in ("Hall 2", LONG):
+        desk.enter(15, of=Names(station, LONG, LONG, LONG))
+    desk.open()
+    desk.page.resize(976, 700)  # that of a window of 1280 px
+    desk.until(lambda: desk.table.n_lines() == 30)
+    desk.until(lambda: not desk.table.horizontalScrollBar().isVisible())
+    assert not desk.table.isColumnHidden(STATION)
+    assert desk.table.horizontalScrollBar().maximum() == 0
+
+
 def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     desk: Desk, settings: Settings
 ) -> None:
@@ -804,6 +848,34 @@ def test_entries_are_saved(desk: Desk, tmp_path: Path) -> None:
     desk.choose_file(tmp_path / "hall-2.jsonl")
     desk.until(lambda: "hall-2.jsonl" in desk.statuses[-1])
     assert desk.notices == []
+
+
+@pytest.mark.parametrize("kind", ["Listed entries (CSV)", "All entries (JSON lines)"])
+def test_saving_that_is_cancelled_leaves_no_file(
+    desk: Desk, tmp_path: Path, hold_back: "HoldBack", kind: str
+) -> None:
+    desk.enter(3)
+    desk.open()
+    desk.show_tab(WHOLE)
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    panel, n_said = desk.child(ArchivePanel), len(desk.statuses)
+    # Amid the entries of the one, before those of the other.
+    may_go_on = hold_back(
+        "lightpen.archive.history._entry_line", "lightpen.archive.history.newest"
+    )
+
+    desk.click(f"{kind}...")
+    desk.choose_file(folder / "entries")
+    desk.until(may_go_on.is_reached.is_set)
+    desk.click("Cancel")
+    may_go_on.set()
+    desk.wait_idle()
+    QThreadPool.globalInstance().waitForDone()
+
+    assert not panel.progress.is_running
+    assert list(folder.iterdir()) == []
+    assert (desk.notices, desk.statuses[n_said:]) == ([], [])
 
 
 @pytest.mark.slow
