@@ -378,11 +378,7 @@ def _images_at(path: Path, where: str) -> ImageSource:
         if not files and inner.is_dir():
             files = _image_files_in(inner)
         if not files:
-            raise FileError(
-                "images.empty-folder",
-                folder=printable(where),
-                suffixes=", ".join(SUFFIXES),
-            )
+            raise _without_images(path, where)
     elif path.is_file():
         if path.suffix.lower() in VIDEO_SUFFIXES:
             return _video(path)
@@ -392,6 +388,20 @@ def _images_at(path: Path, where: str) -> ImageSource:
         if not files:
             raise FileError("images.nothing-there", place=printable(where))
     return image_files(sorted(files, key=_by_name))
+
+
+def _without_images(folder: Path, where: str) -> FileError:
+    """Return the error that names what a folder has instead of images."""
+    others = sorted(file.name for file in folder.iterdir() if file.is_file())
+    if not others:
+        return FileError("images.empty-folder", folder=printable(where))
+    return FileError(
+        "images.only-others",
+        folder=printable(where),
+        suffixes=", ".join(SUFFIXES),
+        count=len(others),
+        name=printable(others[0]),
+    )
 
 
 def _image_files_in(folder: Path) -> list[Path]:

@@ -6240,6 +6240,14 @@ needed</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
     </message>
     <message>
+        <source>The folder {folder} contains no files. Choose the folder with the images.</source>
+        <translation>文件夹 {folder} 中没有文件。请选择包含图像的文件夹。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} contains no images ({suffixes}), but other files ({count}, the first of them {name}). Choose the folder with the images, or a video itself; save images of another format as PNG.</source>
+        <translation>文件夹 {folder} 中没有图像（{suffixes}），但有其他文件（{count} 个，第一个是 {name}）。请选择包含图像的文件夹，或直接选择视频文件；其他格式的图像请保存为 PNG。</translation>
+    </message>
+    <message>
         <source>The header of {name} asks players to turn its frames by {degrees} degrees. This is not applied: the frames are used as stored, which must be the orientation that the intrinsics file was made for.</source>
         <translation>{name} 的文件头要求播放器把画面旋转 {degrees} 度。程序不执行这一旋转：画面按存储的方向使用，内参文件必须是在这一方向上标定的。</translation>
     </message>
@@ -8346,10 +8354,6 @@ needed</source>
     <message>
         <source>The folder {folder} cannot be read: {reason}. Its interrupted swings are not listed. Check the read permission.</source>
         <translation>文件夹 {folder} 无法读取：{reason}。其中未完成的摆动不会列出；请确认您有读取权限。</translation>
-    </message>
-    <message>
-        <source>The folder {folder} contains no images ({suffixes}). Choose the folder with the images.</source>
-        <translation>文件夹 {folder} 中没有图像 ({suffixes})。请指定图像所在的文件夹。</translation>
     </message>
     <message>
         <source>The folder {folder} is not empty. Choose another folder for this swing; nothing is overwritten.</source>

@@ -494,3 +494,12 @@ def with_exif(data: bytes, suffix: str, exif: bytes) -> bytes:
 
 def test_images_without_tag_need_no_remark(folder: Path) -> None:
     assert find_images(str(folder)).remark() is None
+
+
+def test_a_folder_without_images_says_what_it_has(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="contains no files"):
+        find_images(str(tmp_path))
+    (tmp_path / "swing.avi").write_bytes(b"RIFF")
+
+    with pytest.raises(FileError, match=r"first of them swing\.avi.*a video itself"):
+        find_images(str(tmp_path))
