@@ -63,8 +63,7 @@ from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import MeasureService, VerificationRun
 from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.session import (
     SessionSetup,

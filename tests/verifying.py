@@ -24,7 +24,6 @@ from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.probing.probing import ProbingPhase
-from lightpen_extensions.measure.runner import VerificationRunner
 from lightpen_extensions.measure.session import (
     ReadingState,
     SessionEventKind,
@@ -38,6 +37,7 @@ from lightpen_extensions.measure.tasks.task import (
     VerificationChoices,
     VerificationTask,
 )
+from lightpen_extensions.measure.workflow import VerificationRunner
 
 TIMEOUT = 60.0  # s until a test gives up
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)

@@ -6,14 +6,11 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.files import FileFormat
-from lightpen.model.artefacts import Artefact
 from lightpen.record.exports import save_new
-from lightpen.record.library.tip_library import Library
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
@@ -24,12 +21,7 @@ from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_extensions.measure.measuring.part import MeasuredPart, taught_plan
-from lightpen_extensions.measure.measuring.plan import (
-    Plan,
-    PlannedFeature,
-    artefact_plan,
-    free_plan,
-)
+from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature, free_plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan, write_plan
 from lightpen_extensions.measure.measuring.report import EXPORTS
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
@@ -39,15 +31,6 @@ from lightpen_extensions.measure.tasks.part import PART, planned_at
 
 SUFFIXES = "*.yaml *.yml"
 BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least
-
-
-def listed_artefacts(library: Library) -> dict[str, Artefact]:
-    """Return the artefacts in use by their names."""
-    return {
-        name: item.artefact
-        for name, item in library.references.items()
-        if item.artefact is not None and not item.is_retired
-    }
 
 
 def choose_plan(service: MeasureService, plan: Plan | None) -> None:
@@ -79,7 +62,6 @@ class PlanPanel(Translated, QWidget):
         self._start, self.of_part, self.of_feature = (QWidget() for _ in range(3))
         self._open, self._teach, self._plate = (PushButton() for _ in range(3))
         self._texts = tuple(text_label(TextSize.LEAD) for _ in range(3))
-        self._artefact = ChoiceField()
         self._kind = ChoiceField()
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
@@ -93,7 +75,7 @@ class PlanPanel(Translated, QWidget):
             button.setProperty("inviting", button is self._open)
             button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
             horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
-        fill(rows, (self._artefact, 0, Qt.AlignmentFlag.AlignLeft), 2)
+        fill(rows, 2)
         horizontal_layout(self.of_feature, self._kind)
         of_part = self._save_plan, self._export, self._other
         horizontal_layout(self.of_part, *of_part)
@@ -104,8 +86,6 @@ class PlanPanel(Translated, QWidget):
         self._plate.clicked.connect(self._on_plate_clicked)
         self._other.clicked.connect(self._on_other_clicked)
         self._question.agreed.connect(self._leave_plan)
-        self._artefact.activated.connect(self._on_artefact_chosen)
-        workbench.library.changed.connect(self._list_artefacts)
         self._kind.activated.connect(self._on_kind_chosen)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
@@ -164,8 +144,6 @@ class PlanPanel(Translated, QWidget):
         for label, text in zip(self._texts, texts, strict=True):
             label.setText(text)
         self._other.setText(self.tr("Other plan"))
-        self._artefact.setAccessibleName(self.tr("Artefact of the library"))
-        self._list_artefacts()
         self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
@@ -218,20 +196,6 @@ class PlanPanel(Translated, QWidget):
 
     def _leave_plan(self) -> None:
         choose_plan(self._service, None)
-
-    def _list_artefacts(self) -> None:
-        """Offer the references of the library that have a plan."""
-        self._artefact.clear()
-        self._artefact.addItem(self.tr("Artefact..."))
-        library = self._workbench.library.statuses.library
-        for name, artefact in listed_artefacts(library).items():
-            self._artefact.addItem(name, artefact)
-        self._artefact.setVisible(self._artefact.count() > 1)
-
-    def _on_artefact_chosen(self) -> None:
-        artefact = self._artefact.currentData()
-        if artefact is not None:
-            self.choose(artefact_plan(self._artefact.currentText(), [artefact]))
 
     def _on_plate_clicked(self) -> None:
         self.choose(plate_plan())

@@ -20,8 +20,7 @@ from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import State, status_text
 from lightpen_app_extensions.measure.check_list import CheckRow, value_text
 from lightpen_app_extensions.measure.part_view import FigureValue, posture_value
-from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import MeasureService, VerificationRun
 from lightpen_extensions.measure.probing.probing import SETTLING, ProbingPhase
 from lightpen_extensions.measure.session import (
     BROKEN_OFF,

@@ -25,8 +25,8 @@ from lightpen_app_extensions.measure.progress_panel import DetailsView, Progress
 from lightpen_app_extensions.measure.service import (
     MeasureService,
     ProbingSimulatorControls,
+    VerificationRun,
 )
-from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.session import SessionEventKind
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped

@@ -33,9 +33,9 @@ from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.presenter import VerifyView
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import VerificationRun
+from lightpen_extensions.measure.measuring.report import ResultTable, points_table
 from lightpen_extensions.measure.session import SessionSetup, SessionState
-from lightpen_extensions.measure.tasks.task import ResultTable, points_table
 
 PROGRESS_STEPS = 1000
 STATE_HEIGHT = 9 * GRID  # px, at least
@@ -278,7 +278,7 @@ class DetailsView(PageScroll):
         """Show a session; None for none."""
         tables: tuple[ResultTable, ...] = ()
         if setup is not None and state is not None:
-            tables = (points_table(state.touches),)
+            tables = (points_table([each.point_cam for each in state.touches]),)
             if state.found is not None:
                 tables = setup.task.tables(state.found, setup.conditions)
         for index, view in enumerate(self._tables):

@@ -1,14 +1,18 @@
 """Verification and measuring in the window: runs, choices, and what Start shows."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
+from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication
+from PySide6.QtCore import QCoreApplication, QObject, Signal
 from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
 from lightpen.archive.chains import Event
 from lightpen.record.folder import VERIFIED
+from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.face import (
     DemoStep,
     InterruptedWork,
@@ -24,9 +28,11 @@ from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.work.job import Notifications
+from lightpen_app.work.swing_run import RunView
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.probing_operator import ProbingOperator, plate_plan
+from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import (
     InterruptedVerification,
@@ -36,6 +42,7 @@ from lightpen_extensions.measure.tasks.drift import DRIFT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.registry import ALL_TASKS, task_of
 from lightpen_extensions.measure.tasks.task import VerificationChoices
+from lightpen_extensions.measure.workflow import VerificationRunner
 from lightpen_extensions.simulator.hand import Operator
 
 KEY = "measure"
@@ -44,11 +51,56 @@ LONGEST = 16  # characters of a name
 translate = QCoreApplication.translate
 
 
-class MeasureService(Service):
-    """Verifies tips by reference artefacts, and measures parts by the tip.
+class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
+    """Status and events of a verification as Qt signals; commands go to its `runner`.
 
-    The pages are those of `MeasureFace`.
+    `progressed` reports recorded images that are read.
     """
+
+    files_changed = Signal()  # a verification was kept in files
+
+    def __init__(
+        self,
+        archive: FolderArchive,
+        folder: Path,
+        now: Callable[[], datetime],
+        notifications: Notifications,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(VerificationStatus(), notifications, parent)
+        self.probing_operator: ProbingOperator | None = None  # leads a simulated hand
+        self.runner = VerificationRunner(archive, folder, self, now)
+
+    def shut_down(self) -> None:
+        """Write the results and end; its signals start nothing more."""
+        self.blockSignals(True)
+        self.runner.shut_down()
+
+    def await_end(self, timeout_s: float) -> bool:
+        """Wait for the end after `shut_down` and return whether it came."""
+        return self.runner.await_end(timeout_s)
+
+    def on_verification(
+        self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
+    ) -> None:
+        """Forward the newest status and every event, on a thread of the runner."""
+        probing_operator, setup, state = (
+            self.probing_operator,
+            status.setup,
+            status.state,
+        )
+        if probing_operator is not None and setup is not None and state is not None:
+            probing_operator.follow(setup, state)
+        self.post(status, events)
+
+    @override
+    def _compare(self, before: VerificationStatus, now: VerificationStatus) -> None:
+        if before.files != now.files:
+            self.files_changed.emit()
+
+
+class MeasureService(Service):
+    """Verifies tips and measures parts; its pages are those of `MeasureFace`."""
 
     verify_step = "verify"
 

@@ -27,7 +27,7 @@ from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.check_list import CheckRow
 from lightpen_app_extensions.measure.part_view import FigureValue
-from lightpen_app_extensions.measure.plan_panel import choose_plan, listed_artefacts
+from lightpen_app_extensions.measure.plan_panel import choose_plan
 from lightpen_app_extensions.measure.presenter import VerifyPresenter
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
@@ -174,7 +174,11 @@ class ChecksPresenter(VerifyPresenter):
     @property
     def artefacts(self) -> dict[str, Artefact]:
         """The artefacts of the library by their names."""
-        return listed_artefacts(self._library.statuses.library)
+        return {
+            name: item.artefact
+            for name, item in self._library.statuses.library.references.items()
+            if item.artefact is not None and not item.is_retired
+        }
 
     @override
     def rows(self) -> tuple[CheckRow, ...]:

@@ -23,7 +23,7 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.measure.probing.current_tip import read_tip_in_force
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.stream.messages import StreamedTip, tip_metadata

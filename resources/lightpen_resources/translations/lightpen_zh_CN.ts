@@ -3245,10 +3245,6 @@
         <translation>按 YAML 文件中的测量计划测量。</translation>
     </message>
     <message>
-        <source>Artefact of the library</source>
-        <translation>库中的标准件</translation>
-    </message>
-    <message>
         <source>Only with the simulated camera.</source>
         <translation>仅适用于模拟相机。</translation>
     </message>
@@ -3319,10 +3315,6 @@
     <message>
         <source>Continue</source>
         <translation>继续</translation>
-    </message>
-    <message>
-        <source>Artefact...</source>
-        <translation>标准件...</translation>
     </message>
     <message>
         <source>Save the measuring plan</source>
@@ -8252,20 +8244,12 @@ needed</source>
         <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm，已计入 U。请将两者夹紧，待相机预热后重新摆动。</translation>
     </message>
     <message>
-        <source>The construction {name} is not defined for features of this kind or number. Check the plan.</source>
-        <translation>构造 {name} 对此类或此数量的要素没有定义。请检查计划。</translation>
-    </message>
-    <message>
         <source>The copy of chain {chain} in this archive is damaged. Check the archive.</source>
         <translation>本档案中链 {chain} 的副本已损坏。请检查档案。</translation>
     </message>
     <message>
         <source>The covariance of the lens field of {name} is not a covariance matrix: it must be symmetric, with correlations from -1 to 1. Correct or remove the entry lens_field.</source>
         <translation>{name} 中镜头残差场的协方差不是协方差矩阵：它必须对称，且相关系数在 -1 到 1 之间。请更正或删除条目 lens_field。</translation>
-    </message>
-    <message>
-        <source>The datum points are on one line, which leaves the rotation about it undetermined. Add a point beside that line.</source>
-        <translation>基准点位于同一条直线上，绕该直线的转动不能确定。请在直线之外增加一点。</translation>
     </message>
     <message>
         <source>The difference from the previous tip is accepted up to {gate:g} times U (k = 2) of the difference along each axis (an unchanged tip is accepted in 95 % of all cases); beyond it, or where the previous tip cannot be read, the verdict is CHECK. A CHECK can be accepted only with a reason, a REPEAT not at all.</source>
@@ -9202,10 +9186,6 @@ needed</source>
     <message>
         <source>{n_named} of {n_views} images are rotated by 180° ({names}). Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
         <translation>{n_views} 幅图像中有 {n_named} 幅旋转了 180°（{names}）。请转回或剔除；标定期间不得转动相机，看图软件也不得旋转其图像。</translation>
-    </message>
-    <message>
-        <source>{n_points} datum points are given; an alignment needs at least {needed}, each with its nominal position.</source>
-        <translation>给出了 {n_points} 个基准点；找正至少需要 {needed} 个，且每个都有标称位置。</translation>
     </message>
     <message>
         <source>{n_points} points do not determine a {kind}; at least {needed} are needed. Probe more points.</source>

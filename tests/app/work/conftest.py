@@ -13,7 +13,7 @@ from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 

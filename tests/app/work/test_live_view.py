@@ -30,7 +30,7 @@ from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.stream.server import PoseStream
 

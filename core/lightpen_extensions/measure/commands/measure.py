@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lightpen.commands.arguments import (
     above_zero,
     add_ball,
@@ -24,11 +26,14 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen, add_verify_press
-from lightpen.comparisons.assessment import VERIFY_AGAIN, check
+from lightpen.comparisons.assessment import VERIFY_AGAIN, VerificationAssessment, check
+from lightpen.comparisons.records import COLUMN, verdict_lines
 from lightpen.errors import FileError, UsageError
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.files import FileFormat, write_whole
-from lightpen.messages import message
+from lightpen.messages import Message, message
 from lightpen.model.artefacts import REFERENCE, Artefact, ArtefactKind, Side
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
 from lightpen_extensions.measure.commands.touched import (
@@ -40,10 +45,13 @@ from lightpen_extensions.measure.commands.touched import (
 )
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
-from lightpen_extensions.measure.measuring.report import EXPORTS
-from lightpen_extensions.measure.reports import found_text, touches_text
+from lightpen_extensions.measure.measuring.report import EXPORTS, ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.part import PART
-from lightpen_extensions.measure.tasks.probed_point import point_entries
+from lightpen_extensions.measure.tasks.probed_point import (
+    ProbedPoint,
+    RejectedFrame,
+    point_entries,
+)
 from lightpen_extensions.measure.tasks.registry import (
     TASKS,
     AnyTask,
@@ -52,7 +60,6 @@ from lightpen_extensions.measure.tasks.registry import (
 )
 from lightpen_extensions.measure.tasks.task import (
     Found,
-    ResultTable,
     Runs,
     VerificationChoices,
     rule_of,
@@ -385,3 +392,61 @@ def _concluded(
     record = measured.record(given, task.kind, entries, judged, rule)
     keep_record(given, record, measured.calibration, measured.origin)
     return verdict_status(given, judged.grade)
+
+
+MOST_COLUMNS = 10  # runs beside each other
+MOST_NAMED = 5  # images
+NAME = 28  # characters
+
+
+def found_text(
+    tables: Sequence[ResultTable],
+    assessment: VerificationAssessment,
+    rejected: Sequence[RejectedFrame],
+    rule: Message,
+    remarks: Sequence[Message] = (),
+) -> str:
+    """Return the result of a task as text, with remarks on the instrument."""
+    lines = [line for table in tables for line in _table(table)]
+    lines += [*map(str, remarks), *_left_out(rejected)]
+    return "\n".join([*lines, "", *verdict_lines(assessment, rule)])
+
+
+def touches_text(
+    touches: Sequence[ProbedPoint],
+    instrument: Instrument,
+    rejected: Sequence[RejectedFrame],
+) -> str:
+    """Return points with their uncertainty as text."""
+    rows = []
+    for touch in touches:
+        spread = np.sqrt(np.diag(touch.covariance(instrument)))
+        values = [*touch.point_cam.tolist(), *(COVERAGE_FACTOR * spread).tolist()]
+        rows.append(ResultRow(touch.label, values))
+    columns = (*"uvw", *(message("drift.axis", axis=axis) for axis in "uvw"))
+    table = ResultTable(message("table.points"), columns, tuple(rows))
+    lines = [*_table(table), "U has k = 2.", *map(str, instrument.remarks)]
+    return "\n".join([*lines, *_left_out(rejected)])
+
+
+def _table(table: ResultTable) -> list[str]:
+    """Return a table as lines; one of many columns is parted."""
+    lines, n_columns = [f"{table.title}"], len(table.columns)
+    for first in range(0, n_columns, MOST_COLUMNS):
+        own = slice(first, first + MOST_COLUMNS)
+        heads = [str(head) for head in table.columns[own]]
+        width = max(COLUMN, *(len(head) + 2 for head in heads))
+        lines.append(" " * NAME + "".join(f"{head:>{width}}" for head in heads))
+        for row in table.rows:
+            cells = "".join(f"{text:>{width}}" for text in row.texts()[own])
+            words = f"{str(row.name)[:NAME]:<{NAME}}{cells}"
+            lines.append(f"{words}  {row.remark}" if row.remark else words)
+    return [line.rstrip() for line in (*lines, *map(str, table.notes))]
+
+
+def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
+    if not rejected:
+        return []
+    named = ", ".join(f"{each.name} ({each.reason})" for each in rejected[:MOST_NAMED])
+    more = ", ..." if len(rejected) > MOST_NAMED else ""
+    return [f"{len(rejected)} images left out: {named}{more}"]

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -38,10 +38,10 @@ from lightpen_extensions.measure.probing.sources import (
     PenCameras,
     ProbingRun,
     RecordedConditions,
-    RecordedTouch,
     instrument_of,
     observe_place,
     read_viewers,
+    recorded_runs,
     touch_place,
     touches_of,
 )
@@ -260,11 +260,11 @@ def touches_at(places: Sequence[str], instrument: Instrument) -> list[ProbedPoin
 
 @dataclass(frozen=True, eq=False)
 class _SeenRun:
-    """Observations of a run in each camera, by images or centres."""
+    """Observations of a run in each camera, by images or centres; or known runs."""
 
     name: str
     views: tuple[Observations, ...]
-    touches: tuple[RecordedTouch, ...] | None = None
+    known: Sequence[ProbingRun] = ()
 
 
 def _seen(
@@ -281,8 +281,9 @@ def _seen(
         view = observe_centers(own, instrument.camera, instrument.pen)
         seen.append(_SeenRun(path.name, (view,)))
     for i, place in enumerate(places, start=1):
-        views = observe_place(place, instrument)
-        seen.append(_SeenRun(place.name, views, place.touches))
+        known = recorded_runs(place, instrument)
+        views = () if known else observe_place(place, instrument)
+        seen.append(_SeenRun(place.name, views, known))
         report(i / len(places))
     return seen
 
@@ -297,7 +298,12 @@ def _runs_of(
     """
 
     def by(rules: ProbingRules) -> list[ProbingRun]:
-        return [run for each in seen for run in _parted(each, instrument, rules)]
+        return [
+            run
+            for each in seen
+            for run in each.known
+            or [touches_of(each.name, each.views, instrument, rules)]
+        ]
 
     if n_frames is not None:
         return by(ProbingRules(n_frames, SETTLING) if n_frames > 1 else ONE_IMAGE)
@@ -307,23 +313,6 @@ def _runs_of(
         if error.message.code != "verification.never-still":
             raise
     return by(ONE_IMAGE)
-
-
-def _parted(
-    seen: _SeenRun, instrument: Instrument, rules: ProbingRules
-) -> list[ProbingRun]:
-    """Return the touches of images, of the record of a session run by run."""
-    numbers = {each.run for each in seen.touches or () if each.number}
-    if len(numbers) < 2:
-        return [touches_of(seen.name, seen.views, instrument, rules, seen.touches)]
-    runs = list[ProbingRun]()
-    for number in sorted(numbers):
-        own = [
-            each if each.run == number else replace(each, number=0)
-            for each in seen.touches or ()
-        ]
-        runs.append(touches_of(seen.name, seen.views, instrument, rules, own))
-    return runs
 
 
 def _pen(

@@ -1,4 +1,4 @@
-"""The frame of a part: by 3-2-1, or by nominal points.
+"""The frame of a part, by 3-2-1.
 
 An alignment is the rigid motion ``part_from_cam``; as a quantity it has the values of a
 rotation vector and a translation, with their derivative by all inputs, so that results
@@ -13,11 +13,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.model.coverage import COVERAGE_FACTOR
-from lightpen.model.rigid import (
-    nearest_rotation,
-    rotation_from_vector,
-    vector_from_rotation,
-)
+from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE, Feature
 
 # Measured quantities that share their inputs: values with a common derivative.
@@ -84,16 +80,7 @@ def derive(
     return Quantity(values, by_inputs)
 
 
-def stacked_quantities(quantities: Sequence[Quantity]) -> Quantity:
-    """Return several quantities as one, in their order."""
-    return Quantity(
-        np.concatenate([each.values for each in quantities]),
-        np.concatenate([each.by_inputs for each in quantities]),
-    )
-
-
-MIN_POINTS = 3
-THIN = 1e-3  # of the extent: points on a line determine no frame
+THIN = 1e-3  # sine of the angle between line and normal that determine no frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +88,6 @@ class Alignment:
     """A part's frame."""
 
     motion: Quantity  # rotation vector and translation of part_from_cam, rad and mm
-    residuals: FloatArray  # (N,), of datum points from nominals; empty for 3-2-1
 
     @property
     def rotation(self) -> FloatArray:
@@ -146,35 +132,4 @@ def align_321(primary: Quantity, secondary: Quantity, origin: Quantity) -> Align
     z, x = primary.values[AXIS], secondary.values[AXIS]
     if np.linalg.norm(np.cross(z, x)) < THIN * np.linalg.norm(z) * np.linalg.norm(x):
         raise CalibrationError("measuring.datums-parallel")
-    return Alignment(derive(motion, primary, secondary, origin), np.zeros(0))
-
-
-def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
-    """Align by the origins of features with places (N, 3), mm, in the part.
-
-    W. Kabsch, Acta Cryst. A32 (1976) 922-923.
-    """
-    n = len(points)
-    actual = np.array([point.values[PLACE] for point in points])
-    if n < MIN_POINTS or n != len(nominals):
-        raise CalibrationError("measuring.few-datums", n_points=n, needed=MIN_POINTS)
-    if min(_thinness(actual), _thinness(nominals)) < THIN:
-        raise CalibrationError("measuring.datums-on-line")
-
-    def motion(places: FloatArray) -> FloatArray:
-        here = places.reshape(n, 3)
-        middle, there = here.mean(axis=0), nominals.mean(axis=0)
-        R = nearest_rotation((nominals - there).T @ (here - middle))
-        return _as_motion(R, there - R @ middle)
-
-    places = stacked_quantities(
-        [Quantity(point.values[PLACE], point.by_inputs[PLACE]) for point in points]
-    )
-    found = derive(motion, places)
-    R, t = rotation_from_vector(found.values[:3]), found.values[3:]
-    return Alignment(found, np.linalg.norm(actual @ R.T + t - nominals, axis=1))
-
-
-def _thinness(points: FloatArray) -> float:
-    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return float(extents[1] / max(extents[0], np.finfo(float).tiny))
+    return Alignment(derive(motion, primary, secondary, origin))

@@ -22,7 +22,6 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.artefacts import Side
 from lightpen.model.coverage import COVERAGE, symmetric_root
-from lightpen_extensions.measure.measuring import constructions
 from lightpen_extensions.measure.measuring.alignment import Quantity, derive
 from lightpen_extensions.measure.measuring.compensation import TouchedSurface
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE, Feature
@@ -65,6 +64,38 @@ KINDS: dict[Of, set[FeatureKind]] = {
 ENDS = {Side.INSIDE: 1.0, Side.OUTSIDE: -1.0, Side.CENTRE: 0.0}
 
 
+def _unit(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def distance(first: FloatArray, second: FloatArray) -> float:
+    """Return the distance of two origins, mm."""
+    return float(np.linalg.norm(second[PLACE] - first[PLACE]))
+
+
+def distance_to_plane(feature: FloatArray, plane: FloatArray) -> float:
+    """Return the signed distance of an origin from a plane, mm."""
+    return float((feature[PLACE] - plane[PLACE]) @ _unit(plane[AXIS]))
+
+
+def distance_to_line(feature: FloatArray, line: FloatArray) -> float:
+    """Return the distance of an origin from a line or axis, mm."""
+    way = feature[PLACE] - line[PLACE]
+    return float(np.linalg.norm(np.cross(_unit(line[AXIS]), way)))
+
+
+def distance_of_lines(first: FloatArray, second: FloatArray) -> float:
+    """Return the shortest distance of two lines that are not parallel, mm."""
+    normal = _unit(np.cross(first[AXIS], second[AXIS]))
+    return abs(float((second[PLACE] - first[PLACE]) @ normal))
+
+
+def angle(first: FloatArray, second: FloatArray) -> float:
+    """Return the angle between two axes or normals as they point, 0 to pi, rad."""
+    a, b = first[AXIS], second[AXIS]
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
 def is_defined(
     quantity: Of, kinds: Sequence[FeatureKind | None], datum: FeatureKind | None = None
 ) -> bool:
@@ -82,8 +113,8 @@ class Measured:
 
     surface: TouchedSurface  # compensated by the ball radius, camera frame
     in_part: Quantity  # the same in the frame of the part
-    feature: Feature | None = None  # fit to the ball centres; None if constructed
-    points: Quantity | None = None  # ball centres, (3 n,), camera frame
+    feature: Feature  # fit to the ball centres
+    points: Quantity  # ball centres, (3 n,), camera frame
     nominal: Nominal | None = None  # by design
 
     @property
@@ -137,7 +168,7 @@ def _smooth(quantity: Of, found: list[Measured], ball: Quantity) -> Quantity:
         return _distance(one, two)
     out = sum(ENDS[each.surface.side] for each in found)
     return derive(
-        lambda a, b, radius: constructions.distance(a, b) + out * radius[0],
+        lambda a, b, radius: distance(a, b) + out * radius[0],
         *(one.surface.quantity, two.surface.quantity, ball),
     )
 
@@ -153,11 +184,11 @@ def _angle(first: Quantity, second: Quantity) -> Quantity:
     """Return the angle between two directions without their signs, 0 to 90 degrees."""
     is_obtuse = first.values[AXIS] @ second.values[AXIS] < 0
 
-    def angle(a: FloatArray, b: FloatArray) -> float:
-        found = float(np.rad2deg(constructions.angle(a, b)))
+    def acute(a: FloatArray, b: FloatArray) -> float:
+        found = float(np.rad2deg(angle(a, b)))
         return 180 - found if is_obtuse else found
 
-    return derive(angle, first, second)
+    return derive(acute, first, second)
 
 
 def _distance(one: Measured, two: Measured) -> Quantity:
@@ -166,20 +197,18 @@ def _distance(one: Measured, two: Measured) -> Quantity:
         one, two = two, one
     first, second = one.surface.quantity, two.surface.quantity
     if two.kind in FLAT:
-        height = constructions.distance_to_plane(first.values, second.values)
+        height = distance_to_plane(first.values, second.values)
         sign = 1.0 if height >= 0 else -1.0
-        return derive(
-            lambda a, b: sign * constructions.distance_to_plane(a, b), first, second
-        )
+        return derive(lambda a, b: sign * distance_to_plane(a, b), first, second)
     if one.kind in AXIAL and two.kind in AXIAL:
         if _angle(first, second).values[0] > PARALLEL:
-            return derive(constructions.distance_of_lines, first, second)
-        return derive(constructions.distance_to_line, first, second)
+            return derive(distance_of_lines, first, second)
+        return derive(distance_to_line, first, second)
     if one.kind in AXIAL:
         one, two, first, second = two, one, second, first
     if two.kind in AXIAL:
-        return derive(constructions.distance_to_line, first, second)
-    return derive(constructions.distance, first, second)
+        return derive(distance_to_line, first, second)
+    return derive(distance, first, second)
 
 
 def _deviation(
@@ -190,7 +219,7 @@ def _deviation(
 ) -> Value:
     quantity = planned.quantity
     if quantity in FORMS:
-        return _form(planned, one, inputs)
+        return _form(one, inputs)
     if quantity is Of.POSITION:
         return _position(planned, one, inputs)
     if datum is None:
@@ -200,10 +229,8 @@ def _deviation(
     return _orientation(planned, one, datum, inputs)
 
 
-def _form(planned: PlannedCharacteristic, one: Measured, inputs: FloatArray) -> Value:
+def _form(one: Measured, inputs: FloatArray) -> Value:
     """Return the form error about least squares, with U by its residuals."""
-    if one.feature is None or one.points is None:
-        raise _refused(planned)
     n_points, n_distances = one.feature.distances.shape
     errors = one.feature.distances_by_points @ one.points.by_inputs
     drawn = _draws(errors, inputs).reshape(N_DRAWS, n_points, n_distances)
@@ -237,8 +264,6 @@ def _orientation(
     planned: PlannedCharacteristic, one: Measured, datum: Measured, inputs: FloatArray
 ) -> Value:
     """Return parallelism or perpendicularity to a datum."""
-    if one.points is None:
-        raise _refused(planned)
     # A plane that is parallel to an axis contains it, so that roles change with kinds.
     along = (planned.quantity is Of.PARALLELISM) == (datum.kind in FLAT)
     if one.kind in FLAT:
@@ -269,7 +294,6 @@ def _orientation(
 
 def _extent(one: Measured) -> float:
     """Return the extent of the touches of a feature along its axis, mm."""
-    assert one.points is not None
     along = one.points.values.reshape(-1, 3) @ one.surface.quantity.values[AXIS]
     return float(np.ptp(along))
 

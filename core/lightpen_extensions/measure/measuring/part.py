@@ -13,12 +13,10 @@ from lightpen.model.artefacts import Side
 from lightpen.model.coverage import Decision, conformity_probability, decide
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.measuring import constructions
 from lightpen_extensions.measure.measuring.alignment import (
     Alignment,
     Quantity,
     align_321,
-    align_points,
     derive,
     quantity_of,
 )
@@ -36,7 +34,6 @@ from lightpen_extensions.measure.measuring.compensation import (
     along_touches,
     surface_of,
 )
-from lightpen_extensions.measure.measuring.constructions import recognise, recognised
 from lightpen_extensions.measure.measuring.features import (
     AXIS,
     PLACE,
@@ -49,9 +46,9 @@ from lightpen_extensions.measure.measuring.plan import (
     Nominal,
     Plan,
     PlannedCharacteristic,
-    PlannedConstruction,
     PlannedFeature,
 )
+from lightpen_extensions.measure.measuring.recognition import recognise, recognised
 from lightpen_extensions.measure.measuring.surfaces import NAMES, SURFACES, FeatureKind
 
 OTHER_KIND = 0.05  # of the extent of points: farther off they show another kind
@@ -96,7 +93,7 @@ class MeasuredPart:
 
     plan: Plan
     touches: PartTouches
-    features: Mapping[str, Measured]  # all features and constructed features by name
+    features: Mapping[str, Measured]  # by name
     alignment: Alignment | None  # None if results are in the frame of the camera
     results: tuple[CharacteristicResult, ...]
 
@@ -126,11 +123,9 @@ def measure_part(
     for name, surface in surfaces.items():
         own = surface.quantity
         in_part = own if alignment is None else alignment.in_part(own)
-        features[name] = Measured(surface, in_part)
-        if name in probed:
-            each = probed[name]
-            nominal = each.planned.nominal
-            features[name] = Measured(surface, in_part, each.fit, each.points, nominal)
+        each = probed[name]
+        nominal = each.planned.nominal
+        features[name] = Measured(surface, in_part, each.fit, each.points, nominal)
     results = tuple(
         _result(planned, features, touches, limits) for planned in plan.characteristics
     )
@@ -153,7 +148,7 @@ def _surfaces(
     touches: PartTouches,
     were_recognised: set[str],
 ) -> dict[str, TouchedSurface]:
-    """Return the surfaces of all features, and the constructed ones.
+    """Return the surfaces of all features.
 
     Points and lines come last: their normals are those of planes, or vectors in the
     frame of the part, whose directions the ball does not change.
@@ -170,19 +165,12 @@ def _surfaces(
             each.kind, each.quantity, Side.CENTRE, Evidence.NONE
         )
     for _ in range(ROUNDS if thin else 0):
-        frame = None if plan.alignment is None else _aligned(plan, _with(plan, found))
+        frame = None if plan.alignment is None else _aligned(plan, found)
         for name, each in thin.items():
             normal = normals[name] or _normal_of_plan(each, frame)
             if normal is not None or name not in were_recognised:
                 found[name] = surface_of(each, touches, normal)
-    return _with(plan, {each.name: found[each.name] for each in plan.features})
-
-
-def _with(plan: Plan, surfaces: dict[str, TouchedSurface]) -> dict[str, TouchedSurface]:
-    """Return the surfaces with the constructed ones."""
-    for planned in plan.constructions:
-        surfaces = {**surfaces, planned.name: _constructed(planned, surfaces)}
-    return surfaces
+    return {each.name: found[each.name] for each in plan.features}
 
 
 def _normal_of_plane(
@@ -318,27 +306,10 @@ def _require_determined(feature: Feature, touches: PartTouches, at: IntArray) ->
         raise CalibrationError("measuring.undetermined", kind=NAMES[feature.kind])
 
 
-def _constructed(
-    planned: PlannedConstruction, surfaces: Mapping[str, TouchedSurface]
-) -> TouchedSurface:
-    of = [surfaces[name] for name in planned.of]
-    made = constructions.constructor(planned.construct, [each.kind for each in of])
-    if made is None:
-        raise CalibrationError("measuring.no-construction", name=planned.name)
-    found = derive(made.made_from, *(of[i].quantity for i in made.order))
-    if made.kind is FeatureKind.POINT:  # without a direction
-        found = derive(lambda place: np.concatenate([place, [0.0, 0.0, 1.0]]), found)
-    return TouchedSurface(made.kind, found, Side.OUTSIDE, Evidence.NONE)
-
-
 def _aligned(plan: Plan, surfaces: Mapping[str, TouchedSurface]) -> Alignment | None:
     planned = plan.alignment
     if planned is None:
         return None
-    if planned.points:
-        nominals = [plan.feature(name).nominal for name in planned.points]
-        places = np.array([each.origin for each in nominals if each is not None])
-        return align_points([surfaces[n].quantity for n in planned.points], places)
     return align_321(
         surfaces[planned.plane].quantity,
         surfaces[planned.line].quantity,

@@ -36,15 +36,6 @@ Name: TypeAlias = Annotated[str, Meta(min_length=1, max_length=80)]
 Positive: TypeAlias = Annotated[float, Meta(gt=0, le=FARTHEST)]
 
 
-class Construction(StrEnum):
-    """Features constructed from others."""
-
-    MIDPOINT = "midpoint"
-    PROJECTION = "projection"  # of a point on a plane or an axis
-    INTERSECTION = "intersection"  # of axis and plane, or of two or three planes
-    APEX = "apex"  # of a cone
-
-
 class CharacteristicKind(StrEnum):
     """Evaluated characteristics."""
 
@@ -131,26 +122,17 @@ class PlannedFeature(_Entry, frozen=True):
         return needed if needed == 1 else REDUNDANT * needed
 
 
-class PlannedConstruction(_Entry, frozen=True):
-    """A feature constructed from others."""
-
-    name: Name
-    construct: Construction
-    of: tuple[Name, ...]
-
-
 class PlannedAlignment(_Entry, frozen=True):
-    """The part's frame: by 3-2-1 (plane, line, point), or by points with nominals."""
+    """The part's frame by 3-2-1."""
 
-    plane: str = ""
-    line: str = ""
-    point: str = ""
-    points: tuple[Name, ...] = ()
+    plane: Name
+    line: Name
+    point: Name
 
     @property
     def features(self) -> tuple[str, ...]:
         """Features that it needs."""
-        return self.points or (self.plane, self.line, self.point)
+        return self.plane, self.line, self.point
 
 
 class PlannedCharacteristic(_Entry, frozen=True):
@@ -210,7 +192,6 @@ class Plan(_Entry, frozen=True):
 
     name: Name
     features: Annotated[tuple[PlannedFeature, ...], Meta(min_length=1)]
-    constructions: tuple[PlannedConstruction, ...] = ()
     alignment: PlannedAlignment | None = None
     characteristics: tuple[PlannedCharacteristic, ...] = ()
     rule: DecisionRule | None = None  # None: that of the station
@@ -233,11 +214,6 @@ class Plan(_Entry, frozen=True):
         """Return the part of the plan that some of its features determine."""
         features = tuple(each for each in self.features if each.name in names)
         known = {each.name for each in features}
-        constructions = []
-        for each in self.constructions:
-            if known.issuperset(each.of):
-                constructions.append(each)
-                known.add(each.name)
         frame = self.alignment
         if frame is not None and not known.issuperset(frame.features):
             frame = None
@@ -248,11 +224,7 @@ class Plan(_Entry, frozen=True):
             and (frame is self.alignment or each.quantity not in NEEDS_FRAME)
         )
         return structs.replace(
-            self,
-            features=features,
-            constructions=tuple(constructions),
-            alignment=frame,
-            characteristics=characteristics,
+            self, features=features, alignment=frame, characteristics=characteristics
         )
 
 

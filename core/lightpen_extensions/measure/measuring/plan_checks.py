@@ -21,11 +21,9 @@ from lightpen_extensions.measure.measuring.characteristics import (
     NEEDS_DATUM,
     is_defined,
 )
-from lightpen_extensions.measure.measuring.constructions import constructor
 from lightpen_extensions.measure.measuring.plan import (
     FARTHEST,
     Plan,
-    PlannedAlignment,
     PlannedCharacteristic,
     PlannedFeature,
 )
@@ -36,11 +34,7 @@ PLAN = message("measuring.plan")
 MAX_SIZE = 1_000_000  # bytes
 MAX_FEATURES = 1000
 WITH_NORMAL = {FeatureKind.POINT, FeatureKind.LINE}
-NOUNS = {
-    "features": "feature",
-    "constructions": "construction",
-    "characteristics": "characteristic",
-}
+NOUNS = {"features": "feature", "characteristics": "characteristic"}
 TYPES = {
     "array": "a list in brackets",
     "object": "a group of entries",
@@ -90,7 +84,6 @@ def write_plan(plan: Plan, path: Path) -> None:
 def problems_of(plan: Plan) -> Iterator[str]:
     """Yield the contradictions of a plan, in English as the rest of the format."""
     names = [each.name for each in plan.features]
-    names += [each.name for each in plan.constructions]
     for name in names:
         if names.count(name) > 1:
             yield f"{name!r} is defined twice"
@@ -99,20 +92,11 @@ def problems_of(plan: Plan) -> Iterator[str]:
     kinds: dict[str, FeatureKind | None] = {e.name: e.kind for e in plan.features}
     for each in plan.features:
         yield from (f"feature {each.name!r}: {p}" for p in _of_feature(each, kinds))
-    for construction in plan.constructions:
-        of, construct = construction.of, construction.construct
-        where = f"construction {construction.name!r}: "
-        yield from (where + p for p in _unknown(of, kinds))
-        made = constructor(construct, [kinds.get(name) for name in of])
-        if made is None:
-            yield f"{where}a {construct} is not defined for {_listed(of, kinds)}"
-        kinds[construction.name] = None if made is None else made.kind
     if plan.alignment is not None:
-        problems = _of_alignment(plan, plan.alignment, kinds)
-        yield from (f"alignment: {each}" for each in problems)
-    probed = {each.name for each in plan.features}
+        unknown = _unknown(plan.alignment.features, kinds)
+        yield from (f"alignment: {each}" for each in unknown)
     for planned in plan.characteristics:
-        problems = _of_characteristic(plan, planned, kinds, probed)
+        problems = _of_characteristic(plan, planned, kinds)
         yield from (f"characteristic {planned.label!r}: {p}" for p in problems)
 
 
@@ -146,29 +130,8 @@ def _of_feature(
         yield f"the surface {each.surface!r} is no plane of the plan"
 
 
-def _of_alignment(
-    plan: Plan, alignment: PlannedAlignment, kinds: Mapping[str, FeatureKind | None]
-) -> Iterator[str]:
-    used = [alignment.plane, alignment.line, alignment.point]
-    if alignment.points:
-        if any(used):
-            yield "it has either plane, line and point, or points"
-        yield from _unknown(alignment.points, kinds)
-        for each in plan.features:
-            has_origin = each.nominal is not None and each.nominal.origin is not None
-            if each.name in alignment.points and not has_origin:
-                yield f"the nominal origin of {each.name!r} is missing"
-    elif not all(used):
-        yield "it needs plane, line and point, or points"
-    else:
-        yield from _unknown(used, kinds)
-
-
 def _of_characteristic(
-    plan: Plan,
-    each: PlannedCharacteristic,
-    kinds: Mapping[str, FeatureKind | None],
-    probed: set[str],
+    plan: Plan, each: PlannedCharacteristic, kinds: Mapping[str, FeatureKind | None]
 ) -> Iterator[str]:
     yield from _unknown(each.features, kinds)
     # WORKAROUND for msgspec 0.22: bounds of a number in a union with a tuple fail.
@@ -187,11 +150,7 @@ def _of_characteristic(
     if not is_defined(each.quantity, [kinds.get(name) for name in each.of], datum):
         of = _listed(each.features, kinds)
         yield f"a {each.quantity} is not defined for {of}"
-    if is_deviation and each.quantity is not Of.CONCENTRICITY:
-        for name in each.of:
-            if name in kinds and name not in probed:
-                yield f"a {each.quantity} is of a probed feature, {name!r} is none"
-    if each.quantity is Of.POSITION and probed.issuperset(each.of):
+    if each.quantity is Of.POSITION and kinds.keys() >= set(each.of):
         nominal = plan.feature(each.of[0]).nominal
         if nominal is None or nominal.origin is None:
             yield f"the nominal origin of {each.of[0]!r} is missing"
@@ -217,14 +176,10 @@ def _with_lists(tree: Any) -> Any:
     """Return a document in which one name stands for a list of one."""
     if not isinstance(tree, dict):
         return tree
-    groups = [tree.get(name) for name in ("constructions", "characteristics")]
-    entries = [e for group in groups if isinstance(group, list) for e in group]
-    for each, name in [
-        *((e, "of") for e in entries),
-        (tree.get("alignment"), "points"),
-    ]:
-        if isinstance(each, dict) and isinstance(each.get(name), str):
-            each[name] = [each[name]]
+    entries = tree.get("characteristics")
+    for each in entries if isinstance(entries, list) else ():
+        if isinstance(each, dict) and isinstance(each.get("of"), str):
+            each["of"] = [each["of"]]
     return tree
 
 

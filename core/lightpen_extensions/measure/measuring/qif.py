@@ -200,5 +200,5 @@ def _add_feature(
                 _vector(element, "Normal", axis)
             if one.kind in {FeatureKind.CIRCLE, FeatureKind.SPHERE}:
                 add_diameter()
-    if one.feature is not None and one.kind is not FeatureKind.POINT:
+    if one.kind is not FeatureKind.POINT:
         _text(element, "Form", _number(one.feature.form_error))

@@ -1,6 +1,6 @@
 """A measured part as rows of tables and as JSON."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.formats.files import FileFormat
 from lightpen.formats.tables import csv_table
 from lightpen.local_time import local_now
-from lightpen.messages import Message, message, printable
+from lightpen.messages import Message, Number, message, printable
 from lightpen.model.artefacts import SIDES, Side
 from lightpen.model.coverage import Decision
 from lightpen_extensions.measure.measuring.alignment import Quantity
@@ -50,16 +50,78 @@ EVIDENCES = {
 }
 
 
-@dataclass(frozen=True)
-class PartRow:
-    """A row of a table: numbers or words, None for a blank, and a remark."""
+POINTS = message("table.points")
+
+
+@dataclass(frozen=True, eq=False)
+class ResultRow:
+    """A row of a table: its name, and a value for each column or None for a blank."""
 
     name: Message | str
-    values: tuple[float | str | None, ...]
-    remark: Message | str
+    values: Sequence[float | str | None]
+    decimals: int = 4
+    remark: Message | str = ""  # in the last column, with its own head
+
+    def texts(self) -> tuple[str, ...]:
+        """Return the values as texts, without a sign before zero."""
+        return tuple(
+            x or ""
+            if x is None or isinstance(x, str)
+            else f"{Number(x):.{self.decimals}f}"
+            for x in self.values
+        )
 
 
-def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
+@dataclass(frozen=True, eq=False)
+class ResultTable:
+    """Figures of a task with sentences below, for the screen and the window alike."""
+
+    title: Message
+    columns: tuple[Message | str, ...] = ()
+    rows: tuple[ResultRow, ...] = ()
+    notes: tuple[Message, ...] = ()
+
+
+def points_table(points: Iterable[FloatArray], title: Message = POINTS) -> ResultTable:
+    """Return the coordinates of points (3,) in the camera frame."""
+    rows = tuple(
+        ResultRow(message("table.point", number=i), point.tolist())
+        for i, point in enumerate(points, start=1)
+    )
+    return ResultTable(title, tuple("uvw") if rows else (), rows)
+
+
+def part_tables(part: MeasuredPart) -> tuple[ResultTable, ...]:
+    """Return the characteristics and the features of a part."""
+    in_part = message("part.features-in-part")
+    in_camera = message("part.features-in-camera")
+    features = ResultTable(
+        in_camera if part.alignment is None else in_part,
+        (
+            *("x", "y", "z", message("part.position-uncertainty")),
+            *(message("part.size"), message("part.size-uncertainty")),
+            message("part.form"),
+            message("part.kind"),
+        ),
+        tuple(_feature_rows(part)),
+    )
+    characteristics = ResultTable(
+        message("part.characteristics"),
+        (
+            message("part.nominal"),
+            message("part.tolerance"),
+            message("part.actual"),
+            message("part.deviation"),
+            message("table.uncertainty"),
+            message("part.probability"),
+            message("part.decision"),
+        ),
+        tuple(map(_characteristic_row, part.results)),
+    )
+    return tuple(each for each in (characteristics, features) if each.rows)
+
+
+def _feature_rows(part: MeasuredPart) -> Iterator[ResultRow]:
     """Yield x, y, z with the largest U, size with U, form error, and kind.
 
     A size is a diameter, or the angle of a cone in degrees.
@@ -71,12 +133,10 @@ def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
             size = 2 * float(np.rad2deg(values[7])), 2 * float(np.rad2deg(spread[7]))
         elif SURFACES[one.kind].sizes:
             size = 2 * float(values[6]), 2 * float(spread[6])
-        has_form = one.feature is not None and one.kind is not FeatureKind.POINT
-        form = one.feature.form_error if has_form and one.feature is not None else None
+        form = None if one.kind is FeatureKind.POINT else one.feature.form_error
         place = (float(x) for x in values[:3])
-        yield PartRow(
-            name, (*place, float(spread[:3].max()), *size, form), _kind_and_side(one)
-        )
+        row = *place, float(spread[:3].max()), *size, form
+        yield ResultRow(name, row, remark=_kind_and_side(one))
 
 
 def _kind_and_side(one: Measured) -> Message:
@@ -86,8 +146,6 @@ def _kind_and_side(one: Measured) -> Message:
     """
     kind, side, evidence = NAMES[one.kind], one.surface.side, one.surface.evidence
     if evidence is Evidence.NONE:
-        if one.feature is None:
-            return kind
         return message("measuring.sided", kind=kind, side=SIDES[Side.CENTRE])
     if one.kind not in ROUND:  # it is outside of the material
         return message("measuring.decided-by", kind=kind, by=EVIDENCES[evidence])
@@ -97,21 +155,18 @@ def _kind_and_side(one: Measured) -> Message:
     return message("measuring.sided-by", kind=kind, side=SIDES[side], by=by)
 
 
-def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
-    """Yield nominal, tolerance, actual, deviation, U, P and decision."""
-    for result in part.results:
-        yield PartRow(
-            result.planned.words,
-            (
-                result.planned.nominal,
-                _tolerance(result),
-                result.value.value,
-                result.deviation,
-                result.value.uncertainty,
-                result.probability,
-            ),
-            DECISIONS[result.decision],
-        )
+def _characteristic_row(result: CharacteristicResult) -> ResultRow:
+    """Return nominal, tolerance, actual, deviation, U, P and decision."""
+    values = (
+        result.planned.nominal,
+        _tolerance(result),
+        result.value.value,
+        result.deviation,
+        result.value.uncertainty,
+        result.probability,
+    )
+    decision = DECISIONS[result.decision]
+    return ResultRow(result.planned.words, values, remark=decision)
 
 
 def _tolerance(result: CharacteristicResult) -> str:
@@ -140,7 +195,6 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
             "part_from_cam_rotation": alignment.rotation,
             "part_from_cam_translation_mm": alignment.translation,
             "covariance": alignment.motion.covariance(inputs),
-            "residuals_mm": alignment.residuals,
         },
         "features": [
             {
@@ -159,10 +213,8 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
                 ),
                 "expanded_uncertainty": part.uncertainty(name),
                 "covariance": one.in_part.covariance(inputs),
-                "form_error_mm": None
-                if one.feature is None
-                else one.feature.form_error,
-                "n_touches": 0 if one.feature is None else len(one.feature.distances),
+                "form_error_mm": one.feature.form_error,
+                "n_touches": len(one.feature.distances),
                 "nominal": msgspec.to_builtins(one.nominal),
             }
             for name, one in part.features.items()
@@ -302,8 +354,6 @@ def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:
 
 def _reach(one: Measured) -> float:
     """Return the half extent of the points, along an axis or in all directions."""
-    if one.points is None:
-        return MARK
     points = one.points.values.reshape(-1, 3)
     away = points - points.mean(axis=0)
     if one.kind is not FeatureKind.PLANE:

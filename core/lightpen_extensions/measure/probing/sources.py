@@ -39,6 +39,8 @@ from lightpen.record.calibrations import CalibrationFile
 from lightpen.record.swings.header import recorded_assumptions
 from lightpen.record.swings.reading import (
     Record,
+    RecordedImage,
+    image_name,
     is_record,
     open_record,
     recorded_origin,
@@ -51,6 +53,7 @@ from lightpen_extensions.measure.probing.probing import (
 )
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
+    ProbingFrame,
     RejectedFrame,
     StillFrames,
     measure_touches,
@@ -75,15 +78,6 @@ class PenCameras:
         return tuple(file.sha256 for file in self.files)
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedTouch:
-    """The touch of an image, from 1, or 0 for none; and the approach to it, (3,)."""
-
-    number: int
-    approach_cam: FloatArray | None
-    run: int = 1
-
-
 @dataclass(frozen=True)
 class RecordedConditions:
     """Who took images of a record, and in what environment."""
@@ -103,7 +97,7 @@ class ImageLocation:
     pen: Pen | None = None
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)  # (M, 3), stray light, px
-    touches: tuple[RecordedTouch, ...] | None = None
+    held: tuple[tuple[int, StillFrames], ...] = ()  # points of a record, with runs
     recorded: RecordedConditions | None = None
 
     def of_bits(self, bits: int | None) -> "ImageLocation":
@@ -152,7 +146,7 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
             pen=own.pen,
             pen_file=own.pen_file,
             masks=own.masks,
-            touches=_recorded_touches(record),
+            held=held_in(record),
             recorded=RecordedConditions(
                 record.header.operator, recorded_assumptions(record.header.settings)
             ),
@@ -165,15 +159,30 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
     return ImageLocation(where[0], images, origin, masks=(None,) * rig.n_cameras)
 
 
-def _recorded_touches(record: Record) -> tuple[RecordedTouch, ...] | None:
-    """Return the touch of each image of a verification; None for a swing."""
-    if not any(image.touch for image in record.images):
-        return None
-    out = record.excluded
+def held_in(record: Record) -> tuple[tuple[int, StillFrames], ...]:
+    """Return the run of each point in a record, and the point by its LED centres."""
+    by_point: dict[int, list[RecordedImage]] = {}
+    for image in record.used_images:
+        if image.touch:
+            by_point.setdefault(image.touch, []).append(image)
     return tuple(
-        RecordedTouch(0 if i.number in out else i.touch, i.approach_cam, i.run)
-        for i in record.images
+        (own[0].run, StillFrames(tuple(map(_frame, own)), (), own[0].approach_cam))
+        for own in by_point.values()
     )
+
+
+def _frame(image: RecordedImage) -> ProbingFrame:
+    return ProbingFrame(
+        point_image_name(image.number),
+        image.rig_pixels,
+        image.rotation,
+        image.translation,
+    )
+
+
+def point_image_name(number: int) -> str:
+    """Return the name of an image in the record of a session, from 1."""
+    return Path(image_name(number)).name
 
 
 def _recorded_viewers(own: RecordSource) -> PenCameras:
@@ -290,11 +299,8 @@ def _fitted_rig(viewers: PenCameras, fitted: InstrumentRecord) -> Rig:
     )
 
 
-def observe_place(
-    place: ImageLocation, instrument: Instrument
-) -> tuple[Observations, ...]:
-    """Find and label the LEDs in the images of each camera."""
-    rig, pen = instrument.rig, instrument.pen
+def require_cameras(place: ImageLocation, rig: Rig) -> None:
+    """Reject a place of more cameras, or fewer, than a rig has."""
     if len(place.images) != rig.n_cameras:
         raise UsageError(
             "verification.other-number-of-cameras",
@@ -302,6 +308,26 @@ def observe_place(
             n_given=len(place.images),
             n_cameras=rig.n_cameras,
         )
+
+
+def recorded_runs(place: ImageLocation, instrument: Instrument) -> list[ProbingRun]:
+    """Return the points in a record of a session, run by run."""
+    require_cameras(place, instrument.rig)
+    runs = []
+    for number in sorted({run for run, _ in place.held}):
+        own = [still for run, still in place.held if run == number]
+        touches = measure_touches(instrument, own)
+        require_leds_fit(place.name, touches)
+        runs.append(ProbingRun(place.name, touches, ()))
+    return runs
+
+
+def observe_place(
+    place: ImageLocation, instrument: Instrument
+) -> tuple[Observations, ...]:
+    """Find and label the LEDs in the images of each camera."""
+    rig, pen = instrument.rig, instrument.pen
+    require_cameras(place, rig)
     if rig.n_cameras == 1:
         images, mask = place.images[0], place.masks[0]
         return (observe_images(images, instrument.camera, pen, mask=mask),)
@@ -310,26 +336,18 @@ def observe_place(
 
 
 def touches_of(
-    name: str,
-    seen: Sequence[Observations],
-    instrument: Instrument,
-    rules: ProbingRules,
-    touches_known: Sequence[RecordedTouch] | None = None,
+    name: str, seen: Sequence[Observations], instrument: Instrument, rules: ProbingRules
 ) -> ProbingRun:
     """Return the touches in the observations of each camera.
 
     With one image a touch, and none to settle, each image is a touch; else the pen must
-    be held still through as many as the rules say. Images with a recorded touch need no
-    rules. Raises `CalibrationError` if no image shows the pen, or the LEDs are of
-    another pen.
+    be held still through as many as the rules say. Raises `CalibrationError` if no
+    image shows the pen, or the LEDs are of another pen.
     """
     images = _detections(seen, instrument)
     if not any(detection.has_pose for _, detection in images):
         raise _no_pen(name, seen[0])
-    if touches_known is None:
-        held = _held(images, instrument, rules)
-    else:
-        held = _held_as_recorded(images, touches_known)
+    held = _held(images, instrument, rules)
     if not held:
         raise CalibrationError(
             "verification.never-still",
@@ -370,31 +388,6 @@ def _held(
         for name, detection in images
         if detection.has_pose
     )
-
-
-def _held_as_recorded(
-    images: Sequence[tuple[str, PenDetection]], touches: Sequence[RecordedTouch]
-) -> tuple[StillFrames, ...]:
-    """Return the images of each touch."""
-    by_touch: dict[int, list[tuple[str, PenDetection]]] = {}
-    approaches: dict[int, FloatArray | None] = {}
-    for image, touch in zip(images, touches, strict=True):
-        if touch.number:
-            by_touch.setdefault(touch.number, []).append(image)
-            approaches.setdefault(touch.number, touch.approach_cam)
-    held = (
-        StillFrames(
-            tuple(touch_frame(*image) for image in own if image[1].has_pose),
-            tuple(
-                RejectedFrame(name, seen.reason)
-                for name, seen in own
-                if not seen.has_pose
-            ),
-            approaches[number],
-        )
-        for number, own in by_touch.items()
-    )
-    return tuple(still for still in held if still.frames)
 
 
 def _detections(

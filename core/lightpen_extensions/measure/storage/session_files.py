@@ -44,12 +44,12 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.sources import PenCameras
 from lightpen_extensions.measure.session import SessionSetup, VerificationStatus
-from lightpen_extensions.measure.storage.resuming import ResumedVerification
 from lightpen_extensions.measure.storage.session_record import (
     DAMAGED,
     WHAT,
     BeginRecord,
     InterruptedVerification,
+    ResumedVerification,
     SessionRecord,
     VerificationCheckpoint,
     remove_note,

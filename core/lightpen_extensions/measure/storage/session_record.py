@@ -2,10 +2,11 @@
 
 The images are one record, see `lightpen.record.swings.reading`: an image is written,
 with the numbers of point and run, before it counts; one that no longer counts is
-excluded.
-So a session can be read like any recorded images. Beside them a file says what is
-verified and how far. It is replaced whole at each step and removed with the
-conclusion; a record that has it and that no program writes to was interrupted.
+excluded. So a session can be read like any recorded images. Beside them a file says
+what is verified and how far. It is replaced whole at each step and removed with the
+conclusion; a record that has it and that no program writes to was interrupted. When it
+is resumed, its points are measured again from the LED centres in the record, which
+gives the same results; an incomplete point does not count.
 """
 
 import json
@@ -21,7 +22,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.rig_observations import see_together
-from lightpen.errors import FileError
+from lightpen.errors import FileError, UsageError
 from lightpen.formats.files import (
     LARGEST_RECORD,
     MEGABYTE,
@@ -41,24 +42,33 @@ from lightpen.formats.own_json import (
     with_checksum,
 )
 from lightpen.formats.part_files import sweep_parts
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.names import Origin
 from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.library.entered_files import numbered_files
-from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.header import Header, Names
-from lightpen.record.swings.reading import JOURNAL, image_name, open_record
+from lightpen.record.swings.reading import JOURNAL, open_record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView, is_locked
+from lightpen.swing.preparation import Preparation
+from lightpen_extensions.measure.probing.current_tip import (
+    CurrentTip,
+    read_tip_in_force,
+)
 from lightpen_extensions.measure.probing.probing import (
     ProbingEventKind,
     ProbingPhase,
     approach_of,
 )
+from lightpen_extensions.measure.probing.sources import held_in, point_image_name
 from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
     SessionTransition,
     advance_session,
+    run_again,
+    setup_of,
+    touch_again,
 )
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 
@@ -239,11 +249,6 @@ class SessionRecord:
                 del self._numbers[name]
 
 
-def point_image_name(number: int) -> str:
-    """Return the name of an image in the record of a session, from 1."""
-    return Path(image_name(number)).name
-
-
 def remove_note(path: Path) -> None:
     """Remove the file of a concluded session."""
     with suppress(OSError):
@@ -321,3 +326,54 @@ def _read(path: Path) -> InterruptedVerification:
     except DamagedError:
         why = message("under-way.damaged", file=path)
         return InterruptedVerification(path, None, why)
+
+
+@dataclass(frozen=True, eq=False)
+class ResumedVerification:
+    """State of a verification at its interruption."""
+
+    under_way: VerificationCheckpoint
+    tip: CurrentTip
+    setup: SessionSetup
+    state: SessionState
+    files: tuple[Path, ...]  # records written of it
+
+
+def resume_verification(
+    archive: FolderArchive,
+    preparation: Preparation,
+    path: Path,
+    under_way: VerificationCheckpoint,
+) -> ResumedVerification:
+    """Return an interrupted verification, whose file is at a path, with its points.
+
+    The preparation has the names and files of the session. Raises `LightpenError` if
+    another tip is current by now, other files are chosen, or the record of the points
+    cannot be read.
+    """
+    tip = read_tip_in_force(archive, preparation)
+    _require_same(tip, under_way)
+    record, setup = open_record(path.parent), setup_of(tip, under_way.choices)
+    n_frames, state = setup.rules.n_frames, SessionState()
+    held = [(n, each) for n, each in held_in(record) if len(each.frames) >= n_frames]
+    for run in range(1, under_way.n_runs + 1):
+        state = run_again(setup, state, [still for n, still in held if n == run])
+    now = under_way.n_runs + 1
+    state = touch_again(setup, state, [still for n, still in held if n == now])
+    root = path.parents[2]
+    files = tuple(root / name for name in written_since(root, under_way).files)
+    return ResumedVerification(under_way, tip, setup, state, files)
+
+
+def _require_same(tip: CurrentTip, under_way: VerificationCheckpoint) -> None:
+    names = under_way.names
+    if tip.tip_file.sha256 != under_way.tip_sha256:
+        raise UsageError(
+            "under-way.other-tip",
+            result=printable(under_way.tip_file),
+            tip=printable(names.tip),
+            pen=printable(names.pen),
+        )
+    is_pen = tip.pen_file.sha256 == under_way.pen_sha256
+    if not is_pen or tip.viewers.hashes != under_way.seen_by:
+        raise UsageError("under-way.other-files")

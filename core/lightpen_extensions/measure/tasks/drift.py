@@ -31,6 +31,7 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import COVERAGE_FACTOR, Decision, chi_square_quantile
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import angles_between
+from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.fixed_point import (
     ELSEWHERE,
     LIFTED,
@@ -43,8 +44,6 @@ from lightpen_extensions.measure.tasks.task import (
     Conditions,
     Found,
     HandGoal,
-    ResultRow,
-    ResultTable,
     Runs,
     Screening,
     TaskProgress,

@@ -36,6 +36,11 @@ from lightpen.model.coverage import (
     symmetric_root,
 )
 from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.measure.measuring.report import (
+    ResultRow,
+    ResultTable,
+    points_table,
+)
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
     joint_covariance,
@@ -48,8 +53,6 @@ from lightpen_extensions.measure.tasks.task import (
     Conditions,
     Found,
     HandGoal,
-    ResultRow,
-    ResultTable,
     Runs,
     Screening,
     VerificationChoices,
@@ -294,12 +297,12 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
         ),
     ]
     tables = (
-        _points(message("fixed-point.table"), found.calibrated.points),
+        points_table(found.calibrated.points, message("fixed-point.table")),
         _comparison(found.calibrated, found.nominal, own, change),
     )
     if found.nominal is None:
         return tables
-    nominal = _points(message("fixed-point.nominal-table"), found.nominal.points)
+    nominal = points_table(found.nominal.points, message("fixed-point.nominal-table"))
     return *tables, nominal
 
 
@@ -322,15 +325,6 @@ def _bands(found: FixedPoint, conditions: Conditions) -> tuple[Band, ...]:
         kept = Decision.ACCEPTED if value <= limit else Decision.REJECTED
         bands.append(Band(name, value, u, upper=limit, decision=kept))
     return tuple(bands)
-
-
-def _points(title: Message, places: FloatArray) -> ResultTable:
-    """Return the coordinates of each point: the paper's Table 2."""
-    rows = (
-        ResultRow(message("table.point", number=i), place)
-        for i, place in enumerate(places.tolist(), 1)
-    )
-    return ResultTable(title, tuple("uvw"), tuple(rows))
 
 
 def _comparison(

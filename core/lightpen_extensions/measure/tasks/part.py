@@ -5,7 +5,7 @@ order, and the shown and recorded results. A plan that is ended early gives the 
 of the probed features.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Any
@@ -51,12 +51,7 @@ from lightpen_extensions.measure.measuring.plan import (
     PlannedFeature,
 )
 from lightpen_extensions.measure.measuring.plan_checks import missing_normal
-from lightpen_extensions.measure.measuring.report import (
-    PartRow,
-    characteristic_rows,
-    feature_rows,
-    part_entries,
-)
+from lightpen_extensions.measure.measuring.report import part_entries, part_tables
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
@@ -70,8 +65,6 @@ from lightpen_extensions.measure.tasks.task import (
     Found,
     HandGoal,
     Points,
-    ResultRow,
-    ResultTable,
     Runs,
     TaskProgress,
     VerificationChoices,
@@ -212,10 +205,9 @@ class Part(Found):
         """Return the way from its feature to each point, (3,), mm; None if unknown."""
         found: list[FloatArray | None] = [None] * len(self.points)
         for name, one in self.part.features.items():
-            if one.feature is not None:
-                at = self.part.touches.of(name).tolist()
-                for i, offset in zip(at, one.feature.offsets, strict=True):
-                    found[i] = offset
+            at = self.part.touches.of(name).tolist()
+            for i, offset in zip(at, one.feature.offsets, strict=True):
+                found[i] = offset
         return found
 
 
@@ -385,40 +377,6 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     }
 
 
-def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
-    part = found.part
-    in_part = message("part.features-in-part")
-    in_camera = message("part.features-in-camera")
-    features = ResultTable(
-        in_camera if part.alignment is None else in_part,
-        (
-            *("x", "y", "z", message("part.position-uncertainty")),
-            *(message("part.size"), message("part.size-uncertainty")),
-            message("part.form"),
-            message("part.kind"),
-        ),
-        _rows(feature_rows(part)),
-    )
-    characteristics = ResultTable(
-        message("part.characteristics"),
-        (
-            message("part.nominal"),
-            message("part.tolerance"),
-            message("part.actual"),
-            message("part.deviation"),
-            message("table.uncertainty"),
-            message("part.probability"),
-            message("part.decision"),
-        ),
-        _rows(characteristic_rows(part)),
-    )
-    return tuple(each for each in (characteristics, features) if each.rows)
-
-
-def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
-    return tuple(ResultRow(each.name, each.values, 4, each.remark) for each in rows)
-
-
 def _bands(found: Part, conditions: Conditions) -> tuple[Band, ...]:
     return tuple(
         Band(
@@ -474,7 +432,7 @@ PART = VerificationTask(
     measure=measure_by_plan,
     check=check_feature,
     entries=_entries,
-    tables=_tables,
+    tables=lambda found, conditions: part_tables(found.part),
     bands=_bands,
     judges_points=False,
     hand=hand_goal,

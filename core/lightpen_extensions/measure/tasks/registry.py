@@ -9,14 +9,13 @@ from lightpen.arrays import FloatArray
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen_extensions.measure.measuring.plan import are_of_second_end, artefact_plan
+from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.measuring.surfaces import ROUND
 from lightpen_extensions.measure.tasks.drift import DRIFT
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART, Part, measure_by_plan, sizes_of
 from lightpen_extensions.measure.tasks.task import (
     Conditions,
-    ResultRow,
-    ResultTable,
     Runs,
     VerificationChoices,
     VerificationTask,
@@ -74,7 +73,7 @@ def size_table(found: Part) -> ResultTable:
         (message("table.limit"), [each.margin for each in results]),
     ]
     probed = [found.part.features[each.planned.of[0]] for each in results]
-    forms = [e.feature.form_error for e in probed if e.kind in ROUND and e.feature]
+    forms = [e.feature.form_error for e in probed if e.kind in ROUND]
     if forms:
         of_each.append((message("part.form"), forms))
     rows = [

@@ -14,11 +14,12 @@ from msgspec import Meta
 from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.messages import Message, Number, message
+from lightpen.messages import Message, message
 from lightpen.model.coverage import Decision
 from lightpen.model.limits import BALL_UNCERTAINTY, VerificationLimits, rule_in_words
 from lightpen.record.folder import MEASURED_PART
 from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
+from lightpen_extensions.measure.measuring.report import ResultTable
 from lightpen_extensions.measure.tasks.probed_point import NO_DRIFT, ProbedPoint
 
 ANY = 1e6  # mm or rad: no other place, no other posture makes a point a new one
@@ -70,35 +71,6 @@ class Found:
     def probed(self) -> Points:
         """Probed points whose postures are shown."""
         return ()
-
-
-@dataclass(frozen=True, eq=False)
-class ResultRow:
-    """A row of a table: its name, and a value for each column or None for a blank."""
-
-    name: Message | str
-    values: Sequence[float | str | None]
-    decimals: int = 4
-    remark: Message | str = ""  # in the last column, with its own head
-
-    def texts(self) -> tuple[str, ...]:
-        """Return the values as texts, without a sign before zero."""
-        return tuple(
-            x or ""
-            if x is None or isinstance(x, str)
-            else f"{Number(x):.{self.decimals}f}"
-            for x in self.values
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class ResultTable:
-    """Figures of a task with sentences below, for the screen and the window alike."""
-
-    title: Message
-    columns: tuple[Message | str, ...] = ()
-    rows: tuple[ResultRow, ...] = ()
-    notes: tuple[Message, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,15 +213,3 @@ def rule_of(choices: VerificationChoices, limits: VerificationLimits) -> Message
     plan = choices.plan if choices.kind == MEASURED_PART else None
     stated = None if plan is None else plan.rule
     return rule_in_words(replace(limits, rule=stated or limits.rule))
-
-
-def points_table(points: Sequence[ProbedPoint]) -> ResultTable:
-    """Return the coordinates of points in the camera frame."""
-    return ResultTable(
-        message("table.points"),
-        tuple("uvw") if points else (),
-        tuple(
-            ResultRow(message("table.point", number=i), point.point_cam.tolist())
-            for i, point in enumerate(points, start=1)
-        ),
-    )

@@ -26,7 +26,7 @@ from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.runners import Act, Report, T, Task
 from lightpen.swing.preparation import Preparation, SourceChoice
-from lightpen_extensions.measure.probing.sources import touch_place
+from lightpen_extensions.measure.probing.sources import point_image_name, touch_place
 from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import find_interrupted
@@ -307,12 +307,14 @@ def test_the_images_of_touches_say_which_touch_they_are_of(trace: Trace) -> None
     trace.touch(leant(4)[2])
     (run,) = (trace.folder / SIMULATED / VERIFICATIONS / TOUCHES).iterdir()
     place = touch_place((str(run),))
-    touches, recorded = place.touches, place.recorded
+    held, recorded = place.held, place.recorded
     trace.workflow.shut_down()
-    assert touches is not None
     assert recorded is not None
     assert recorded.operator == trace.prepared.names.operator
     assert recorded.conditions == trace.prepared.assumptions_today
 
-    # A touch that is taken back counts no more; its number is not given again.
-    assert [each.number for each in touches] == [1, 1, 1, 0, 0, 0, 3, 3, 3]
+    # A touch that is taken back counts no more.
+    numbers = [[frame.name for frame in still.frames] for _, still in held]
+    assert numbers == [
+        [point_image_name(n) for n in ns] for ns in ((1, 2, 3), (7, 8, 9))
+    ]

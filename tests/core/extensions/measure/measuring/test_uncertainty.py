@@ -1,4 +1,4 @@
-"""U of features, constructions and alignments, by their derivatives.
+"""U of features, characteristics and alignments, by their derivatives.
 
 The coverage of U is measured by ``./run bench measure``.
 """
@@ -10,12 +10,10 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.measuring import constructions as construct
+from lightpen_extensions.measure.measuring import characteristics
 from lightpen_extensions.measure.measuring.alignment import (
-    Alignment,
     Quantity,
     align_321,
-    align_points,
     derive,
     quantity_of,
 )
@@ -29,7 +27,6 @@ R_CAM = rotation_from_vector(np.array([0.3, 0.8, -0.4]))
 
 PLATE = np.array([[x, y, 0.0] for x in (-50, 0, 50) for y in (-40, 0, 40)])
 SIDE = np.array([[x, -60.0 + 0.3 * z, z] for x in (-50, -10, 30) for z in (-5, -20)])
-END = np.array([[-70.0, y, z] for y in (-30, 10) for z in (-5, -20)])
 TURN = np.deg2rad(np.arange(0, 360, 30))
 HOLE = np.column_stack([30 + 8 * np.cos(TURN), 8 * np.sin(TURN), 0 * TURN])
 BOSS = np.column_stack([8 * np.cos(TURN) - 30, 8 * np.sin(TURN), 5.0 * (TURN // 2)])
@@ -43,7 +40,6 @@ CONE = np.column_stack(
 PARTS = {
     "plate": (FeatureKind.PLANE, PLATE),
     "side": (FeatureKind.PLANE, SIDE),
-    "end": (FeatureKind.PLANE, END),
     "hole": (FeatureKind.CIRCLE, HOLE),
     "boss": (FeatureKind.CYLINDER, BOSS),
     "cone": (FeatureKind.CONE, CONE),
@@ -88,33 +84,16 @@ def in_frame(name: str) -> Function:
     return place
 
 
-def best_fit(part: dict[str, Quantity]) -> Quantity:
-    corners = np.array([[30.0, 0, 0], [-30, 0, 0], [0, 50, 20]])
-    axis = DERIVED["axis through plate"](part)
-    found: Alignment = align_points([part["hole"], axis, part["ball"]], corners)
-    return found.motion
-
-
 DERIVED: dict[str, Function] = {
     "radius of the hole": of(lambda hole: hole[6], "hole"),
     "radius of the boss": of(lambda boss: boss[6], "boss"),
     "half angle": of(lambda cone: cone[7], "cone"),
-    "apex": of(construct.apex, "cone"),
-    "distance of hole and ball": of(construct.distance, "hole", "ball"),
-    "ball above plate": of(construct.distance_to_plane, "ball", "plate"),
-    "hole from axis": of(construct.distance_to_line, "hole", "boss"),
-    "edge from axis": of(construct.distance_of_lines, "edge", "boss"),
-    "angle of plate and side": of(construct.angle, "plate", "side"),
-    "midpoint": of(construct.midpoint, "hole", "ball"),
-    "on plate": of(construct.projection_on_plane, "ball", "plate"),
-    "on axis": of(construct.projection_on_line, "ball", "edge"),
-    "axis through plate": of(construct.intersection_of_line_and_plane, "boss", "plate"),
-    "edge of planes": of(
-        lambda a, b: construct.intersection_of_planes(a, b)[3:], "plate", "side"
-    ),
-    "corner": of(construct.intersection_of_three_planes, "plate", "side", "end"),
+    "distance of hole and ball": of(characteristics.distance, "hole", "ball"),
+    "ball above plate": of(characteristics.distance_to_plane, "ball", "plate"),
+    "hole from axis": of(characteristics.distance_to_line, "hole", "boss"),
+    "edge from axis": of(characteristics.distance_of_lines, "edge", "boss"),
+    "angle of plate and side": of(characteristics.angle, "plate", "side"),
     "ball in the part": in_frame("ball"),
-    "best fit": best_fit,
 }
 
 
@@ -152,8 +131,8 @@ def test_a_common_scale_drops_out_of_an_angle_and_stays_in_a_distance(
 ) -> None:
     part = exact
     alone = NOISE**2 * np.eye(N)
-    distance = of(construct.distance, "hole", "ball")(part)
-    angle = of(construct.angle, "plate", "side")(part)
+    distance = of(characteristics.distance, "hole", "ball")(part)
+    angle = of(characteristics.angle, "plate", "side")(part)
 
     assert distance.uncertainty(inputs()) > 1.5 * distance.uncertainty(alone)
     np.testing.assert_allclose(

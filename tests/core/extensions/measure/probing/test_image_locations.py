@@ -78,7 +78,7 @@ def test_the_places_of_each_camera_can_be_given_apart(tmp_path: Path) -> None:
     assert [each.files[0].parent.name for each in found.images] == ["one", "other"]
     assert found.name == places[0]
     assert len(found.files) == 4
-    assert (found.origin, found.touches, found.viewers) == (Origin.RECORDED, None, None)
+    assert (found.origin, found.held, found.viewers) == (Origin.RECORDED, (), None)
     for wrong in (places[:1], [*places, places[0]]):
         with pytest.raises(FileError, match="left, right"):
             touch_place(tuple(wrong), TWO)

@@ -19,7 +19,6 @@ from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
 from lightpen_extensions.measure.probing.sources import (
     ImageLocation,
     ProbingRun,
-    RecordedTouch,
     observe_place,
     require_leds_fit,
     touches_of,
@@ -36,6 +35,9 @@ DOWN = np.array([0.0, 1.0, 0.0])
 LIMITS = VerificationLimits()
 
 
+TWO_IMAGES = ProbingRules(2, 1)
+
+
 def observed(instrument: Instrument, places: list[float | None]) -> Observations:
     """What is seen of a tip at so many mm beside the cone; None shows no pen."""
     holder = Holder(instrument.rig, instrument.pen)
@@ -49,9 +51,10 @@ def observed(instrument: Instrument, places: list[float | None]) -> Observations
     return observe_centers(centers, instrument.camera, instrument.pen)
 
 
-def run(instrument: Instrument, places: list[float | None], **by: Any) -> ProbingRun:
-    usual = {"rules": ProbingRules(2, 1), "touches_known": None}
-    return touches_of("run", [observed(instrument, places)], instrument, **usual | by)
+def run(
+    instrument: Instrument, places: list[float | None], rules: ProbingRules = TWO_IMAGES
+) -> ProbingRun:
+    return touches_of("run", [observed(instrument, places)], instrument, rules)
 
 
 def named(found: ProbingRun) -> list[tuple[str, ...]]:
@@ -77,24 +80,6 @@ def test_images_of_a_run_are_parted_by_how_the_pen_is_held(
         assert [each.name for each in found.rejected] == [names[3], names[7]]
         assert found.rejected[0].reason is not Reason.NONE
         assert found.name == "run"
-
-
-def test_recorded_touches_have_their_images_and_approach(
-    instrument: Instrument,
-) -> None:
-    places = [0.0, 0.0, None, 5.0, 30.0, None, 30.0]
-    numbers = [2, 2, 2, 0, 1, 3, 1]
-    known = [RecordedTouch(n, DOWN if n == 2 else None) for n in numbers]
-    found = run(instrument, places, touches_known=known)
-    names = observed(instrument, places).names
-
-    assert named(found) == [names[:2], (names[4], names[6])]
-    first, second = found.touches
-    assert first.approach_cam is DOWN
-    assert second.approach_cam is None
-    assert [each.name for each in first.rejected] == [names[2]]
-    assert first.rejected[0].reason is not Reason.NONE
-    assert [each.name for each in found.rejected] == [names[5]]
 
 
 def test_a_run_without_pen_or_touch_is_refused_with_figures(

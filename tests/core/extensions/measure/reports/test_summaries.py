@@ -25,9 +25,9 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen_extensions.measure.reports import found_text, touches_text
+from lightpen_extensions.measure.commands.measure import found_text, touches_text
+from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, RejectedFrame
-from lightpen_extensions.measure.tasks.task import ResultRow, ResultTable
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
