@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_stations import leaning, random_station, seen_station
+from tests.simulated_stations import random_station
 
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import write_camera
-from lightpen_extensions.simulator.swings import swing_from_postures
 from lightpen_program.extensions import main
 
 STATION = random_station(6, n_images=160)
@@ -142,34 +141,3 @@ def test_centres_in_millimetres_are_named(
 
     assert "centres in pixels" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
-
-
-@pytest.mark.slow
-def test_touches_of_a_certified_length_give_the_scale(
-    centers: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder, swing = centers.parent, STATION.swing
-    apart = 0.4 * STATION.longest * np.array([1.0, 0.1, 0.3])
-    rows = ["frame,led,x_px,y_px"]
-    for end in (-0.5, 0.5):
-        held = swing_from_postures(
-            leaning(swing.postures, 0.3), swing.tip_pen, swing.cone_cam + end * apart
-        )
-        rng = np.random.default_rng(5)
-        seen = seen_station(STATION.camera, STATION.pen, held, 0.03, 0.0, rng)
-        for frame, pixels in enumerate(seen.pixels[::20], 1000 * (end > 0)):
-            rows += [f"{frame},{j},{x},{y}" for j, (x, y) in enumerate(pixels, 1)]
-    ends, sketch = folder / "ends.csv", folder / "sketch.json"
-    ends.write_text("\n".join(rows) + "\n")
-    write_pen(STATION.pen, sketch)
-    given = ("--pen-sketch", str(sketch), "--touched", str(ends))
-
-    assert main(arguments(centers, *given)) == 2
-    assert "--distance MM and --distance-sigma MM" in capsys.readouterr().err
-
-    distance = ("--distance", f"{np.linalg.norm(apart)}", "--distance-sigma", "0.001")
-    assert main(arguments(centers, *given, *distance)) == 0
-
-    (length,) = json.loads((folder / "found.json").read_text())["lengths"]
-    off = length["length_mm"] - STATION.longest
-    assert abs(off) < 3 * length["standard_uncertainty_mm"] < 0.2

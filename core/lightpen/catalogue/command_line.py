@@ -22,7 +22,6 @@ MESSAGES = {
     "cli.other-number": "Folders or files given: {n_given}. {why}",
     "cli.place-twice": "A folder or file is given twice. {why}",
     "cli.other-order": "The folders {folders} are in another order than the cameras of the rig file, {names}. Give them in the order of the file.",
-    "cli.touched": "A touched length needs three options: --touched RUN, --distance MM and --distance-sigma MM. Give all of them.",
     "cli.option-missing": "{option} FILE is missing. It may be omitted only for the record of a swing.",
     "cli.json-over-input": "--json {record} would replace the input file of that name. Give the record another name.",
     "cli.report-over-result": "{out} would replace its input, the result. Give the PDF another name.",

@@ -25,7 +25,6 @@ from lightpen.commands.console import (
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import require_folder_of, write_whole
-from lightpen.formats.images import SUFFIXES
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.formats.rig_files import write_camera
@@ -37,18 +36,14 @@ from lightpen_extensions.discover.report import (
     discovery_record,
     discovery_text,
     picture_of_pen,
-    swings_record,
-    swings_text,
 )
-from lightpen_extensions.discover.scale import MeasuredLength, Request, TouchedLength
-from lightpen_extensions.discover.together import discover_together
+from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import (
     Report,
     Sightings,
     find_spots,
     sightings_of_centers,
 )
-from lightpen_extensions.measure.commands.touched import touches_at
 
 LONGEST = "longest"
 CALIPER = 0.02  # mm, standard uncertainty of a length unless given
@@ -64,17 +59,14 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="IMAGES",
         help="image folder, file name pattern, video or record of a swing, in the "
-        "order of time, 10 images a second or more; several folders or videos are "
-        "swings of the same pen and tip, adjusted together",
+        "order of time, 10 images a second or more",
     )
     parser.add_argument(
         "--centers",
         type=Path,
-        nargs="+",
-        default=[],
         metavar="FILE.csv",
-        help="spot centres without LED numbers (frame,x_px,y_px) instead of IMAGES, "
-        "one file per swing; needs --image-size",
+        help="spot centres without LED numbers (frame,x_px,y_px) instead of IMAGES; "
+        "needs --image-size",
     )
     parser.add_argument(
         "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
@@ -95,24 +87,6 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         default=CALIPER,
         metavar="MM",
         help=f"standard uncertainty of each length ({CALIPER})",
-    )
-    parser.add_argument(
-        "--touched",
-        nargs="+",
-        default=[],
-        metavar="RUN",
-        help="points of two cones at a certified distance, as for verify length: "
-        "image folders, videos, records or FILE.csv (frame,led,x_px,y_px). With "
-        "--distance they give the scale",
-    )
-    parser.add_argument(
-        "--distance", type=above_zero, metavar="MM", help="distance of the touched ends"
-    )
-    parser.add_argument(
-        "--distance-sigma",
-        type=above_zero,
-        metavar="MM",
-        help="standard uncertainty of the distance",
     )
     parser.add_argument(
         "--led-diameter",
@@ -155,29 +129,20 @@ def _size(text: str) -> tuple[int, int]:
 @printing
 def _discover(options: argparse.Namespace) -> None:
     lengths = tuple(_length(words, options.length_sigma) for words in options.length)
-    touched = _touched(options)
-    if not lengths and touched is None and options.out_pen is not None:
+    if not lengths and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
     rough = options.pen_sketch or options.pen
     sketch = None if rough is None else read_unchecked_pen(rough, "mm")
     _check_outputs(options)
-    places = _places(options)
-    read = partial(_sightings, options, camera)
+    if bool(options.images) == bool(options.centers):
+        raise UsageError("cli.discover-images-or-centers")
+    request = Request(lengths, _diameter(options, sketch), camera, sketch)
     with progress("Finding pen and camera") as report:
         share = 0.0 if options.centers else SEARCHING
-        each = share / len(places)
-        swings = [
-            read(place, partial(_report_part, report, each * k, each))
-            for k, place in enumerate(places)
-        ]
-        diameter = _diameter(options, sketch)
-        request = Request(lengths, diameter, camera, sketch, touched)
+        sightings = _sightings(options, camera, partial(_report_part, report, 0, share))
         rest = partial(_report_part, report, share, 1 - share)
-        together = None
-        if len(swings) > 1:
-            together = discover_together(swings, request, rest)
-        found = together.found if together else discover(swings[0], request, rest)
+        found = discover(sightings, request, rest)
     if options.out_camera is not None:
         require_lens(found.camera)
     if options.out_pen is not None:
@@ -187,40 +152,13 @@ def _discover(options: argparse.Namespace) -> None:
         write_camera(found.camera, options.out_camera)
     if options.picture is not None:
         write_whole(options.picture, picture_of_pen(found))
-    record = discovery_record(found)
-    if together is not None:
-        record |= swings_record(together)
     if options.json is not None:
-        write_record(options.json, record)
+        write_record(options.json, discovery_record(found))
     print(shown(discovery_text(found)))
-    if together is not None:
-        print(shown(swings_text(together)))
-
-
-def _touched(options: argparse.Namespace) -> TouchedLength | None:
-    given = (options.touched or None, options.distance, options.distance_sigma)
-    if given == (None, None, None):
-        return None
-    if None in given:
-        raise UsageError("cli.touched")
-    touches = partial(touches_at, options.touched)
-    return TouchedLength(touches, options.distance, options.distance_sigma)
 
 
 def _report_part(report: Report, start: float, share: float, fraction: float) -> None:
     report(start + share * fraction)
-
-
-def _places(options: argparse.Namespace) -> list[list[str]]:
-    """Return the places of the images of each swing."""
-    if bool(options.images) == bool(options.centers):
-        raise UsageError("cli.discover-images-or-centers")
-    if options.centers:
-        return [[str(path)] for path in options.centers]
-    suffixes = {Path(place).suffix.lower() for place in options.images}
-    if suffixes <= set(SUFFIXES):  # a pattern, as a shell makes it
-        return [options.images]
-    return [[place] for place in options.images]
 
 
 def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
@@ -243,15 +181,14 @@ def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs in no folder, over an input or each other, or of other suffix."""
-    inputs = [*options.centers, options.camera, options.pen, options.pen_sketch]
-    inputs = [path for path in inputs if path is not None]
+    inputs = (options.centers, options.camera, options.pen, options.pen_sketch)
     seen: list[Path] = []
     outputs = (options.out_pen, options.out_camera, options.picture, options.json)
     for path in outputs:
         if path is None:
             continue
         require_folder_of(path)
-        if any(are_same(path, other) for other in (*inputs, *seen)):
+        if any(are_same(path, other) for other in (*inputs, *seen) if other):
             raise UsageError("cli.discover-output-twice", file=path)
         seen.append(path)
     for path, suffixes in (
@@ -266,19 +203,16 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _sightings(
-    options: argparse.Namespace,
-    camera: Camera | None,
-    places: Sequence[str],
-    report: Report,
+    options: argparse.Namespace, camera: Camera | None, report: Report
 ) -> Sightings:
     """Read a swing, which must be of the images of the camera file."""
     if not options.centers:
-        sightings = find_spots(images_at(*places).of_bits(options.bits), report)
+        sightings = find_spots(images_at(*options.images).of_bits(options.bits), report)
     else:
         size = options.image_size or (None if camera is None else camera.image_size)
         if size is None:
             raise UsageError("cli.discover-no-size")
-        given = read_unlabelled_centers(Path(places[0]))
+        given = read_unlabelled_centers(options.centers)
         names = tuple(f"frame {frame}" for frame in given.frames)
         sightings = sightings_of_centers(names, given.centers, size)
     if camera is not None and camera.image_size != sightings.size:

@@ -20,14 +20,11 @@ from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.found import (
     SECOND_PEN,
     Discovery,
-    contradicting_distance,
     discovery_of,
     require_certain,
     require_enough,
@@ -42,14 +39,7 @@ from lightpen_extensions.discover.hypotheses import (
     solve_seed,
 )
 from lightpen_extensions.discover.labelling import Labelled, label, pixels_of
-from lightpen_extensions.discover.scale import (
-    CONTRADICTING,
-    SHAPE,
-    MeasuredLength,
-    Request,
-    known_lengths,
-    with_lengths_known,
-)
+from lightpen_extensions.discover.scale import Request, with_lengths_known
 from lightpen_extensions.discover.scaled_start import (
     adjust_halves,
     numbered,
@@ -64,8 +54,6 @@ from lightpen_extensions.discover.tracks import (
     follow,
     without_lamps,
 )
-from lightpen_extensions.measure.tasks.registry import measure_artefacts
-from lightpen_extensions.measure.tasks.task import Conditions
 
 NOT_SETTLED = (
     "bundle.not-settled",
@@ -110,9 +98,6 @@ def discover(
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
     report(0.5)
-    if request.touched is not None:
-        free = replace(request, lengths=(), touched=None)
-        request = with_touched_length(request, _adjusted(swing, free))
     return _adjusted(swing, request, report)
 
 
@@ -205,35 +190,6 @@ def _of_images(found: Labelled, some: BoolArray) -> Labelled:
     """Return the labelling with some of the images that have a rotation."""
     state = replace(found.state, rotations=found.state.rotations[some])
     return replace(found, state=state, images=found.images[some])
-
-
-def with_touched_length(request: Request, relative: Discovery) -> Request:
-    """Return a request with the distance of two LEDs by the touched length.
-
-    The touches measure that length in the unit of the relative result. The ratio to the
-    certified length is the scale, and so the distance of the LEDs farthest apart.
-    Raises `CalibrationError` if the touches are not of two ends, or a known length
-    contradicts theirs.
-    """
-    touched = request.touched
-    assert touched is not None
-    instrument = relative.calibration.instrument
-    runs = [("--touched", touched.touches(instrument))]
-    unknown = [Artefact(ArtefactKind.LENGTH, 0.0)]
-    (found,) = measure_artefacts("", unknown, runs, Conditions(instrument)).part.results
-    measured = found.value.value
-    known = relative.lengths[0]
-    length = known.length * touched.distance / measured
-    own = found.value.uncertainty / COVERAGE_FACTOR / measured
-    sigma = length * float(np.hypot(own, touched.sigma / touched.distance))
-    for each in known_lengths(request.lengths, relative.pen.leds):
-        implied = measured * each.length / each.between(relative.pen.leds)
-        relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
-        by_chance = np.hypot(implied * relative_sigma, touched.sigma)
-        if abs(implied - touched.distance) > CONTRADICTING * by_chance:
-            raise contradicting_distance(touched.distance, implied, each)
-    by_touches = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
-    return replace(request, lengths=(*request.lengths, by_touches))
 
 
 def _labelled_observations(

@@ -295,13 +295,6 @@ def require_length(
         ratio = each.stated / each.estimated
         if abs(ratio - 1) < OTHER_SIZE:
             continue
-        if request.touched is not None:
-            raise CalibrationError(
-                "discover.touched-length",
-                length=request.touched.distance,
-                found=each.estimated,
-                stated=each.stated,
-            )
         leds, length = ratio * calibration.bundle.state.pen.leds, lengths[0].length
         first, second, _ = nearest_pair(leds, length)
         raise CalibrationError(
@@ -314,20 +307,6 @@ def require_length(
             other=first,
             another=second,
         )
-
-
-def contradicting_distance(
-    stated: float, implied: float, known: KnownLength
-) -> CalibrationError:
-    """Return the error of a cone distance, mm, that a known length contradicts."""
-    return CalibrationError(
-        "discover.cones-contradict",
-        distance=stated,
-        implied=implied,
-        length=known.length,
-        first=known.first + 1,
-        second=known.second + 1,
-    )
 
 
 def require_lens(camera: Camera) -> None:

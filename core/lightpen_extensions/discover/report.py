@@ -14,7 +14,6 @@ from lightpen.model.limits import USUAL
 from lightpen_extensions.boards.distortion import choice_record
 from lightpen_extensions.boards.report import PINHOLE
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.together import Together
 
 TO_MICROMETRES = 1000.0
 OTHER_CAMERA = 3.0  # standard deviations, of the focal length from the file's
@@ -132,54 +131,11 @@ def discovery_text(discovery: Discovery) -> str:
     return "\n".join(lines)
 
 
-def swings_record(together: Together) -> dict[str, Any]:
-    """Return the entries of several swings for the record."""
-    held_out = together.held_out
-    record: dict[str, Any] = plain(
-        {
-            "swings": [
-                {
-                    "tip_pen_mm": each.tip_pen,
-                    "expanded_uncertainty_mm": each.expanded_uncertainty,
-                    "focal_length_px": each.camera.fx,
-                    "images": {
-                        "total": len(each.calibration.used),
-                        "used": int(each.calibration.used.sum()),
-                    },
-                }
-                for each in together.swings
-            ],
-            "held_out": {
-                "tip_difference_mm": held_out.tip,
-                "tip_standard_uncertainty_mm": held_out.tip_sigma,
-                "focal_length_difference_px": held_out.focal_length,
-                "focal_length_standard_uncertainty_px": held_out.focal_length_sigma,
-            },
-        }
-    )
-    return record
-
-
-def swings_text(together: Together) -> str:
-    """Return the result of the validation by the last swing as text, in English."""
-    held_out, um = together.held_out, TO_MICROMETRES
-    x, y, z = (um * held_out.tip).tolist()
-    u = COVERAGE_FACTOR * um * held_out.tip_sigma
-    return (
-        f"{len(together.swings)} swings. The last one against the others: tip "
-        f"{x:+.1f} {y:+.1f} {z:+.1f} µm, U {u[0]:.1f} {u[1]:.1f} {u[2]:.1f}; fx "
-        f"{held_out.focal_length:+.2f} px, U "
-        f"{COVERAGE_FACTOR * held_out.focal_length_sigma:.2f}."
-    )
-
-
 def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
     """Return the limits of the uncertainty, and notes on the result."""
     remarks = _remarks_on_camera(discovery)
     if discovery.is_relative:
         return (*remarks, message("discover.relative"))
-    if not discovery.lengths:
-        return tuple(remarks)
     at = discovery.parameters
     tip = discovery.tip_pen - discovery.pen.leds.mean(axis=0)
     far = int(np.argmax(np.abs(tip)))

@@ -1,19 +1,17 @@
 """Scale of the pen by known lengths, and wide priors for everything else."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import EXACT_SCALE
 from lightpen_extensions.discover.starts import KnownLength, farthest_apart, gradient_of
-from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 
 WIDE = 0.02  # of the pen's size: prior of an LED coordinate
 LARGEST_SCALE = 0.01  # relative, of a scale that a pen file can state apart
@@ -139,25 +137,13 @@ class Request:
     diameter: float  # of the LED discs, mm
     camera: Camera | None = None  # of a camera file, with its covariance
     sketch: Pen | None = None  # rough LEDs, which give numbers and frame
-    touched: "TouchedLength | None" = None  # a certified length
-    n_coefficients: int | None = None  # required by other swings; None: chosen
 
     @property
     def is_relative(self) -> bool:
         """Whether nothing gives the scale."""
-        return not (self.lengths or self.touched)
+        return not self.lengths
 
     @property
     def rough_leds(self) -> FloatArray | None:
         """LEDs of the sketch, (L, 3), mm."""
         return None if self.sketch is None else self.sketch.leds
-
-
-@dataclass(frozen=True, eq=False)
-class TouchedLength:
-    """Touches of both ends of a certified length, after the swing."""
-
-    # Returns the touches as measured with pen, camera and tip as found.
-    touches: Callable[[Instrument], Sequence[ProbedPoint]]
-    distance: float  # of the ends, mm
-    sigma: float  # its standard uncertainty, mm

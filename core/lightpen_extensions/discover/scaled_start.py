@@ -115,22 +115,13 @@ class _Trial(NamedTuple):
 
 
 def choose_lens(
-    start: Start,
-    pixels: FloatArray,
-    lengths: tuple[KnownLength, ...],
-    needed: int | None = None,
+    start: Start, pixels: FloatArray, lengths: tuple[KnownLength, ...]
 ) -> tuple[BundleState, Choice]:
     """Return the start with the lens model that predicts images best, and the choice.
 
-    The start has 5 coefficients; ``needed`` are used instead, unless they fold
-    the image. Pixels (M, L, 2) are LED centres; NaN where one was not seen.
+    The start has 5 coefficients. Pixels (M, L, 2) are LED centres; NaN where one was
+    not seen.
     """
-    if needed is not None and needed != FEW:
-        only = _refitted(start, needed, pixels, lengths, worth=-np.inf)
-        if only is not None:
-            return only.start.state, Choice(needed, {})
-    if needed is not None:
-        return start.state, Choice(FEW, {})
     best = _Trial(start, any_camera(start.state.rig.cameras[0]))
     models = (MANY, FISHEYE) if is_wide(best.camera, pixels) else (MANY,)
     found = (_refitted(start, n, pixels, lengths) for n in models)
@@ -153,11 +144,7 @@ def choose_lens(
 
 
 def _refitted(
-    start: Start,
-    n: int,
-    pixels: FloatArray,
-    lengths: tuple[KnownLength, ...],
-    worth: float = WORTH,
+    start: Start, n: int, pixels: FloatArray, lengths: tuple[KnownLength, ...]
 ) -> _Trial | None:
     """Return the adjustment with n coefficients.
 
@@ -168,7 +155,7 @@ def _refitted(
         return None
     prior, state = any_camera(near), replace(start.state, rig=rig_of(near))
     found = adjust_start(state, pixels, prior, N_STEPS, lengths)
-    is_better = found.sigma <= (1 - worth) * start.sigma
+    is_better = found.sigma <= (1 - WORTH) * start.sigma
     trial = _Trial(found, prior)
     return trial if is_better and not trial.camera.folded_share else None
 
@@ -284,7 +271,7 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
         start = adjust_start(start.state, pixels[some], prior, n_steps, lengths)
     part = start.state
     if known is None:
-        part, choice = choose_lens(start, pixels[some], lengths, request.n_coefficients)
+        part, choice = choose_lens(start, pixels[some], lengths)
     turned, _ = fit_rigid(state.pen.leds, part.pen.leds)
     every = replace(part, rotations=state.rotations @ turned.T)
     prior = camera_prior(part.rig.cameras[0], known)

@@ -5636,10 +5636,6 @@ needed</source>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
-        <source>An LED file needs one known length. Measure the distance between two LEDs and state it, or touch both ends of a certified length.</source>
-        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，或触测一段有证书的长度的两端。</translation>
-    </message>
-    <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
         <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
@@ -8012,14 +8008,6 @@ needed</source>
         <translation>模拟平板</translation>
     </message>
     <message>
-        <source>Swing {number} does not show the LEDs of the first. Give swings of one pen with all its LEDs in view.</source>
-        <translation>摆动 {number} 中看到的不是第一次摆动的 LED。请提供同一光笔且所有 LED 均可见的摆动。</translation>
-    </message>
-    <message>
-        <source>Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.</source>
-        <translation>摆动 {number} 覆盖的镜头视场太小，无法与其他摆动联合平差。请略去它，或让光笔覆盖更大的图像范围。</translation>
-    </message>
-    <message>
         <source>Swing: pen temperature</source>
         <translation>摆动：光笔温度</translation>
     </message>
@@ -8138,6 +8126,10 @@ needed</source>
     <message>
         <source>(max - min) / 2 of the point over all postures: u {u:.4f}, v {v:.4f}, w {w:.4f} mm.</source>
         <translation>各姿态下该点的（最大 - 最小）/ 2：u {u:.4f}，v {v:.4f}，w {w:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>An LED file needs one known length. Measure the distance between two LEDs and state it.</source>
+        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距。</translation>
     </message>
     <message>
         <source>Bending: {assumed:.3f} mm assumed; a press test measures it.</source>
@@ -8664,10 +8656,6 @@ needed</source>
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过。请压紧测头，重新摆动。</translation>
     </message>
     <message>
-        <source>The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.</source>
-        <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其证书值以及圆盘直径。</translation>
-    </message>
-    <message>
         <source>The probed points of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
     </message>
@@ -8678,10 +8666,6 @@ needed</source>
     <message>
         <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. {cause} Then check that the tip was pressed into the cone.</source>
         <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头似乎也在移动。{cause}然后检查测头是否压在锥孔中。</translation>
-    </message>
-    <message>
-        <source>The distance of the touched ends contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
-        <translation>触测的两端间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
     <message>
         <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
@@ -9380,16 +9364,8 @@ needed</source>
         <translation>图像与相机组文件矛盾：相机 {camera} 的 {what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查是否有相机被移动，或重新标定相机组。</translation>
     </message>
     <message>
-        <source>The images of swing {number} are of another size than those of the first. Give swings of one camera.</source>
-        <translation>摆动 {number} 的图像尺寸与第一次不同。请给出同一相机的摆动。</translation>
-    </message>
-    <message>
         <source>The key of the station with chain {chain} is not in this user account; nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
         <translation>链 {chain} 所属工位的密钥不在此用户账户中；无法签名。请使用该工位的账户和计算机、将密钥复制到此处，或由主管引入新密钥（见文档：security）。</translation>
-    </message>
-    <message>
-        <source>The last swing contradicts the others: its tip is {tip:.3f} mm off, {times:.0f} standard deviations. Check that pen, tip, zoom and focus were the same in all swings.</source>
-        <translation>最后一次摆动与其他摆动矛盾：其测头相差 {tip:.3f} mm，即 {times:.0f} 倍标准差。请检查所有摆动中光笔、测头、变焦和对焦是否相同。</translation>
     </message>
     <message>
         <source>The length is between LED {number} and itself. Give the numbers of two LEDs.</source>

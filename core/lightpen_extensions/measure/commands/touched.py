@@ -250,14 +250,6 @@ def measure_runs(
     )
 
 
-def touches_at(places: Sequence[str], instrument: Instrument) -> list[ProbedPoint]:
-    """Return the touches of images, or of files of LED centres, at all places."""
-    centers = [Path(each) for each in places if each.lower().endswith(".csv")]
-    others = [touch_place((p,)) for p in places if Path(p) not in centers]
-    runs = _runs_of(_seen(centers, others, instrument), instrument, None)
-    return [touch for run in runs for touch in run.touches]
-
-
 @dataclass(frozen=True, eq=False)
 class _SeenRun:
     """Observations of a run in each camera, by images or centres; or known runs."""
