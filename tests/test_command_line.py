@@ -690,12 +690,6 @@ class WitnessingDesktop:
     def test_itself(self, report: Path) -> int:
         raise NotImplementedError
 
-    def install_entry(self) -> int:
-        raise NotImplementedError
-
-    def remove_entry(self) -> int:
-        raise NotImplementedError
-
     def data_folder(self) -> Path:
         raise NotImplementedError
 

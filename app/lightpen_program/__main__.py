@@ -38,18 +38,6 @@ class Launchers:
 
         return test_program(report)
 
-    def install_entry(self) -> int:
-        """Put the program into the menu of the desktop."""
-        from lightpen_app.desktop_entry import install_entry
-
-        return install_entry()
-
-    def remove_entry(self) -> int:
-        """Remove it from the menu."""
-        from lightpen_app.desktop_entry import remove_entry
-
-        return remove_entry()
-
     def data_folder(self) -> Path:
         """Return the chosen folder of records, results and archive."""
         from lightpen_app.work.settings import Settings, data_folder, settings_file

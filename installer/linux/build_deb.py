@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from installer.bundled import extra_requirements
+from installer.linux.menu_entry import write_menu_entry
 from installer.places import ROOT
 
 PLACE = Path("opt/lightpen")
@@ -102,13 +103,7 @@ def add_menu_entry(tree: Path) -> None:
     launcher.parent.mkdir(parents=True)
     launcher.symlink_to(f"/{PLACE}/bin/lightpen")
     share = tree / "usr" / "share"
-    share.mkdir()
-    code = (
-        "import sys; sys.argv[0] = '/usr/bin/lightpen';"
-        "from lightpen_app.desktop_entry import install_entry; install_entry()"
-    )
-    environment = {"XDG_DATA_HOME": str(share), "PATH": ""}  # refreshes no lists here
-    run(tree / PLACE / "bin" / "python", "-I", "-B", "-c", code, env=environment)
+    write_menu_entry(share, Path("/usr/bin/lightpen"))
     documents = share / "doc" / "lightpen"
     documents.mkdir(parents=True)
     shutil.copy(ROOT / "LICENSE", documents / "copyright")

@@ -20,7 +20,7 @@ APP = str(Path(lightpen_app.__file__).parent) + os.sep
 MAY = tuple(
     str(Path(APP) / name)
     for name in (
-        *("work/settings_store.py", "crash.py", "self_test", "desktop_entry.py"),
+        *("work/settings_store.py", "crash.py", "self_test"),
         *("look/sounds.py", "look/theme.py", "paper/printing.py"),
     )
 )

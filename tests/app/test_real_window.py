@@ -13,6 +13,7 @@ from ctypes.util import find_library
 from pathlib import Path
 
 import pytest
+from installer.linux.menu_entry import write_menu_entry
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -84,7 +85,7 @@ def test_the_entry_in_the_menu_opens_the_window(tmp_path: Path) -> None:
     own = {f"XDG_{name}_HOME": str(tmp_path) for name in ("CONFIG", "DATA")}
     environment = os.environ | own
     environment.pop("QT_QPA_PLATFORM", None)
-    subprocess.run([program, "--install-desktop-entry"], env=environment, check=True)
+    write_menu_entry(tmp_path, program)
     parser = configparser.RawConfigParser()
     parser.read(tmp_path / "applications" / "lightpen.desktop", encoding="utf-8")
     words = shlex.split(parser["Desktop Entry"]["Exec"])

@@ -145,8 +145,6 @@ MESSAGES = {
     "entered.missing": "The file {file} of entry {number} in the archive is missing. Nothing is accepted until it is restored from a copy, or fetched from the server.",
     "entered.changed": "The file {file} was changed after it was entered in the archive as entry {number}. Nothing is accepted until it is restored from a copy.",
     "entered.changed-before": "The file {file} was changed before it was entered in the archive. Nothing is accepted until it is restored from a copy.",
-    "desktop-entry.refused": "{path} cannot be changed: {reason}. Check the write permission.",
-    "desktop-entry.not-linux": "Desktop entries exist on Linux only. On Windows the installer creates the start menu entry.",
     "file.settings": "settings file",
     "file.machine-settings": "file of settings for all users",
     "machine-settings.wrong": "The settings for all users in {file} are wrong and were left out: {why}. Ask the administrator to correct the file.",

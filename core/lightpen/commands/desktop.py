@@ -10,7 +10,7 @@ from lightpen.errors import UsageError
 
 
 class Desktop(Protocol):
-    """Starts what has a window or a place on a desktop, which gives an exit status."""
+    """Starts what has a window, which gives an exit status."""
 
     def show_window(self, swing: Path | None) -> int:
         """Open the window, at a recorded swing if a path leads to one."""
@@ -20,12 +20,6 @@ class Desktop(Protocol):
 
     def test_itself(self, report: Path) -> int:
         """Test the installation and write a report."""
-
-    def install_entry(self) -> int:
-        """Put the program into the menu of the desktop."""
-
-    def remove_entry(self) -> int:
-        """Remove it from the menu."""
 
     def data_folder(self) -> Path:
         """Return the chosen folder of records, results and archive."""
@@ -51,14 +45,6 @@ def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         type=Path,
         metavar="REPORT.json",
         help="test the installation on this computer and write a report",
-    )
-    starts.add_argument(
-        "--install-desktop-entry",
-        action="store_true",
-        help="add the program to the menu of a Linux desktop",
-    )
-    starts.add_argument(
-        "--remove-desktop-entry", action="store_true", help="remove it from the menu"
     )
 
 
@@ -111,10 +97,6 @@ def _start(desktop: Desktop, options: argparse.Namespace) -> int:
         return desktop.play_demo()
     if options.self_test is not None:
         return desktop.test_itself(options.self_test)
-    if options.install_desktop_entry:
-        return desktop.install_entry()
-    if options.remove_desktop_entry:
-        return desktop.remove_entry()
     return desktop.show_window(None)
 
 

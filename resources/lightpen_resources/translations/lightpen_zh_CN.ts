@@ -7624,10 +7624,6 @@ needed</source>
         <translation>判定规则：{rule}。</translation>
     </message>
     <message>
-        <source>Desktop entries exist on Linux only. On Windows the installer creates the start menu entry.</source>
-        <translation>桌面条目仅适用于 Linux。在 Windows 上，开始菜单项由安装程序创建。</translation>
-    </message>
-    <message>
         <source>Different poses of the board: {n_views}; at least {least} are needed, 15 are better. Move and tilt the board between views.</source>
         <translation>标定板的不同位姿：{n_views} 个；至少需要 {least} 个，最好 15 个。请在各视图之间移动并倾斜标定板。</translation>
     </message>
@@ -9430,10 +9426,6 @@ needed</source>
     <message>
         <source>Files that were used to calibrate the tip cannot verify it: {n} of these. Probe the artefact anew.</source>
         <translation>这些文件中有 {n} 个是标定该测头时所用的，不能用来验证它。请重新测量标准器。</translation>
-    </message>
-    <message>
-        <source>{path} cannot be changed: {reason}. Check the write permission.</source>
-        <translation>无法更改 {path}：{reason}。请确认您有写入权限。</translation>
     </message>
     <message>
         <source>{path} cannot be written: it is a folder. Choose a file name.</source>

@@ -53,7 +53,7 @@ NAMED_BY_STANDARDS = re.compile(
 )
 TRANSLATING = {"tr", "translate", "QT_TRANSLATE_NOOP"}
 UNSEEN = {"setObjectName", "TypeVar", "ValueError"}  # whose words no user reads
-ENGLISH = ("self_test", "crash.py", "desktop_entry.py")  # files, and both languages
+ENGLISH = ("self_test", "crash.py")  # files, and both languages
 NAMES = {
     *("Lightpen", "English", "Fusion", "Lightpen Sans", "Lightpen Sans SC", "Cgk"),
     *("Demo", "Trial", "Trainee"),  # of stations, pens and tips
