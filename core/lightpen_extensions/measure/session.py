@@ -220,12 +220,19 @@ def advance_session(
         return SessionTransition(state, events)
     try:
         state = with_touch(setup, state)
-        if not _suffices(setup, state):
-            return SessionTransition(state, events)
-        state = _with_run(setup, state)
+    except CalibrationError as error:
+        return SessionTransition(replace(state, fault=error.message), events)
+    return replace(end_run(setup, state), events=events)
+
+
+def end_run(setup: SessionSetup, state: SessionState) -> SessionTransition:
+    """End the current run if its points suffice, and with the last one the task."""
+    try:
+        if _suffices(setup, state):
+            state = _with_run(setup, state)
     except CalibrationError as error:
         state = replace(state, fault=error.message)
-    return SessionTransition(state, events, state.done)
+    return SessionTransition(state, finished=state.done)
 
 
 def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
@@ -255,16 +262,10 @@ def run_again(
 def touch_again(
     setup: SessionSetup, state: SessionState, held: Sequence[StillFrames]
 ) -> SessionState:
-    """Return the session with the touches of its current run.
-
-    A touch that would end the run is omitted, as the run was not ended.
-    """
+    """Return the session with the touches of its current run; see `end_run`."""
     touching = with_taken(setup.instrument, state.touching, held)
     touches = measure_touches(setup.instrument, held)
-    state = replace(state, touching=touching, touches=touches)
-    while state.touches and _suffices(setup, state):
-        state = without_last_touch(state)
-    return state
+    return replace(state, touching=touching, touches=touches)
 
 
 def without_last_touch(state: SessionState) -> SessionState:

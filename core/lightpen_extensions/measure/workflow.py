@@ -49,6 +49,7 @@ from lightpen_extensions.measure.session import (
     SessionTransition,
     VerificationListener,
     VerificationStatus,
+    end_run,
     end_task,
     ending,
     event_kinds,
@@ -166,13 +167,7 @@ class VerificationWorkflow:
         before = self._status.state
         if before is None or not before.touches:
             return
-        after = without_last_touch(before)
-        try:
-            self._keeping.images.follow(before, SessionTransition(after))
-        except FileError as error:
-            self._faults.report(error.message)
-            return
-        self._publish(replace(self._status, state=after))
+        self._follow(before, SessionTransition(without_last_touch(before)))
 
     def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Accept the tip despite findings, or report why not."""
@@ -203,9 +198,12 @@ class VerificationWorkflow:
         status = self._status
         if status.setup is None or status.state is None:
             return
-        transition = end_task(status.setup, status.state)
+        self._follow(status.state, end_task(status.setup, status.state))
+
+    def _follow(self, before: SessionState, transition: SessionTransition) -> None:
+        """Keep what no image brought about, or report why that is impossible."""
         try:
-            self._keeping.images.follow(status.state, transition)
+            self._keeping.images.follow(before, transition)
         except FileError as error:
             self._faults.report(error.message)
             return
@@ -242,18 +240,22 @@ class VerificationWorkflow:
             return
         self._faults.end()
         self._choices = before.setup.choices  # of that session
-        self._publish(
-            VerificationStatus(
-                tip=before.tip,
-                setup=before.setup,
-                state=with_pen_at_rest(before.state),
-                region=before.tip.region,
-                began=before.under_way.began,
-                files=before.files,
-                is_here=self._status.is_here,
-                refusal=self._why_not(before.tip),
-            )
+        state = with_pen_at_rest(before.state)
+        self._status = VerificationStatus(
+            tip=before.tip,
+            setup=before.setup,
+            state=state,
+            region=before.tip.region,
+            began=before.under_way.began,
+            files=before.files,
+            is_here=self._status.is_here,
+            refusal=self._why_not(before.tip),
         )
+        transition = end_run(before.setup, state)
+        if transition.state is state:
+            self._publish(self._status)
+        else:  # it was interrupted before its complete run was ended
+            self._follow(state, transition)
 
     def cancel(self) -> None:
         """Stop reading."""

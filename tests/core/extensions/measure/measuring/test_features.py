@@ -10,7 +10,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.measuring.features import _solve, fit_feature
+from lightpen_extensions.measure.measuring import features
+from lightpen_extensions.measure.measuring.features import _solve, fit_feature, starts
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 
 EXACT = 1e-9  # mm
@@ -163,3 +164,28 @@ def test_few_points_of_a_cone_or_a_pin_end_in_no_false_minimum(n_points: int) ->
             start = FAR, R, np.array(sizes)
             _, best = _solve(SURFACES[kind], q @ R.T + FAR, start, 1e-12)
             assert np.sum(found.distances**2) <= 1.001 * best
+
+
+@pytest.mark.parametrize(
+    ("n_points", "seed"), [(8, 4), (8, 41), (8, 51), (8, 127), (9, 26), (9, 95)]
+)
+def test_a_cone_that_four_plain_starts_miss_is_found(
+    n_points: int, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng([n_points, seed])
+    slope, radius = np.tan(rng.uniform(0.1, 1.2)), rng.uniform(5, 20)
+    z = rng.uniform(-1, 1, n_points) * min(8, 0.8 * radius / slope)
+    turn = np.linspace(0, np.radians(rng.uniform(180, 360)), n_points)
+    rho = radius + slope * z
+    q = np.column_stack([rho * np.cos(turn), rho * np.sin(turn), z])
+    q += 0.005 * rng.standard_normal(q.shape)
+    surface = SURFACES[FeatureKind.CONE]
+    truth = np.zeros(3), np.eye(3), np.array([radius, np.arctan(slope)])
+    _, best = _solve(surface, q, truth, 1e-12)
+
+    found = fit_feature(FeatureKind.CONE, q)
+    monkeypatch.setattr(features, "FEW", 0)  # as if the points were many
+    plain = [_solve(surface, q, each, 1e-7)[1] for each in starts(FeatureKind.CONE, q)]
+
+    assert np.sum(found.distances**2) <= 1.001 * best
+    assert min(plain) > 1.01 * best

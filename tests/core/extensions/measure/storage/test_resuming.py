@@ -2,6 +2,7 @@
 
 import pickle
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -166,6 +167,54 @@ def test_killed_it_is_offered_and_keeps_every_touch(
     state = go_on(verifying())
 
     assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be reported
+
+
+# Verifies and is killed when the images of a run are kept and nothing else is yet.
+KILLED_AT_THE_END = """
+import os, pickle, signal, sys
+from pathlib import Path
+from lightpen_extensions.measure.storage.session_record import SessionRecord
+from tests.verifying import PART_CHOICES, Verifier
+from tests.core.extensions.measure.storage.test_resuming import acts
+
+follow, last = SessionRecord.follow, int(sys.argv[3])
+
+def follow_until_killed(self, before, transition):
+    if transition.finished or len(transition.state.runs) > max(len(before.runs), last):
+        os.kill(os.getpid(), signal.SIGKILL)
+    follow(self, before, transition)
+
+SessionRecord.follow = follow_until_killed
+verifier = Verifier(Path(sys.argv[1]), pickle.loads(Path(sys.argv[2]).read_bytes()))
+verifier.come(PART_CHOICES)
+for act in acts(verifier):
+    act()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_runs", [0, 1, 2], ids=["feature", "end", "whole part"])
+def test_killed_after_the_last_image_of_a_run_no_point_is_lost(
+    in_force: Path, prepared: Preparation, verifying: Verifying, n_runs: int
+) -> None:
+    chosen = in_force / "prepared.pickle"
+    chosen.write_bytes(pickle.dumps(prepared))
+    words = [sys.executable, "-c", KILLED_AT_THE_END]
+    words += [str(in_force), str(chosen), str(n_runs)]
+    killed = subprocess.run(words, cwd=Path(__file__).parents[5], check=False)
+    assert killed.returncode == -signal.SIGKILL
+
+    second = verifying()
+    state = go_on(second)
+
+    if n_runs < 2:
+        assert [len(run) for run in state.runs] == [10, 1][: n_runs + 1]
+        second.touch(*BAR[n_runs:])
+    second.ear.wait_until(lambda: second.status.is_done)
+    (part,) = second.records
+    assert len(part["touches"]) == N_ACTS
+    assert second.conclusions[0]["outcome"] != "abandoned"
+    assert find_interrupted(in_force) == ()
 
 
 @pytest.mark.slow
