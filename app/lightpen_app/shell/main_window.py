@@ -446,9 +446,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             statuses += [
                 Status(title, complete=False, why_closed="") for title in titles
             ]
-        self._sidebar.set_steps(list_steps(statuses, self._now))
+        action = self._main_action()
+        is_said = bool(action.why_not)
+        self._sidebar.set_steps(list_steps(statuses, self._now, is_reason_said=is_said))
         self._area.set_heading(page.heading(), page.lead(), page.lead_tone())
-        self._action_bar.set_action(self._main_action(), can_go_back=self._now > 0)
+        self._action_bar.set_action(action, can_go_back=self._now > 0)
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
 

@@ -60,17 +60,20 @@ class Step:
     shows_reason: bool = False
 
 
-def list_steps(statuses: Sequence[Status], now: int) -> tuple[Step, ...]:
+def list_steps(
+    statuses: Sequence[Status], now: int, *, is_reason_said: bool = False
+) -> tuple[Step, ...]:
     """Return the steps when the page of index `now` is shown.
 
     The page that is shown is never closed, and going back is always free: a step
-    before it is closed only by its own reason.
+    before it is closed only by its own reason. No reason is shown where the page says
+    itself what is missing.
     """
     steps = [
         _step(status, is_now=index == now) for index, status in enumerate(statuses)
     ]
     closed = [i for i, step in enumerate(steps) if step.state is StepState.CLOSED]
-    for index in closed[:1]:
+    for index in closed[:1] if not is_reason_said else ():
         steps[index] = replace(steps[index], shows_reason=True)
     return tuple(steps)
 

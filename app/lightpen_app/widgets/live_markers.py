@@ -82,6 +82,7 @@ def led_numbers(seen: LiveImage) -> dict[int, str]:
 
 TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the circle, degrees
 FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)
+TILTED = 2.0  # px of shortage that upright words may have more than turned ones
 DISTANCE = 1.085  # from the centre of the dial to the mark's; radius = 1
 
 
@@ -137,7 +138,9 @@ def draw_camera(
     turns = (0.0, along, *(along + each for each in TURNS))
     turn, box = min(
         ((turn, box) for turn in turns for box in (right, left)),
-        key=lambda each: _shortage(each[0], each[1], room, stand),
+        key=lambda each: (
+            _shortage(each[0], each[1], room, stand) + TILTED * bool(each[0])
+        ),
     )
     painter.translate(stand.place)
     painter.rotate(turn)

@@ -109,6 +109,7 @@ class Canvas(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 LEFT_WIDTH = 9 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = 6 * GRID  # px that a title leaves free, as for a button
 LEAST_TITLE = 9  # px
+BESIDE_LABEL = 8 * GRID  # px of height for the title, numbers and label of x
 SIDE = 0.045  # of many numbered items, beside the first and the last
 N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are whole
 MARGIN = 0.06  # of the range, left free around the data
@@ -140,7 +141,7 @@ class Plot(Figure):
 
     def __init__(self, axes: Axes) -> None:
         super().__init__()
-        self._title_px = 0
+        self._fitted = (0, True)  # px of the title, whether y is named
         self._y_range = (0.0, 0.0)  # shown by `_fit`
 
         # Widgets
@@ -183,7 +184,7 @@ class Plot(Figure):
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._fitted_title_px() != self._title_px:
+        if (self._fitted_title_px(), self._has_room_for_y()) != self._fitted:
             self._restyle()
 
     def _named_curves(self) -> tuple[str, ...]:
@@ -204,18 +205,27 @@ class Plot(Figure):
         room = max(self.width() - TITLE_MARGIN, 1)
         return max(min(int(largest * room / max(needed, 1.0)), largest), LEAST_TITLE)
 
+    def _has_room_for_y(self) -> bool:
+        """Return whether the name of y fits beside its axis."""
+        words = QFontMetricsF(font(TextSize.SMALL)).horizontalAdvance(self._axes.y)
+        return words <= self.height() - BESIDE_LABEL
+
     def _restyle(self) -> None:
         """Update the colours; subclasses add their curves."""
         colors = colors_of(self.palette())
         self._graphics.setBackground(colors.panel)
-        self._title_px = self._fitted_title_px()
-        size = f"{self._title_px}px"
+        self._fitted = title_px, is_y_named = (
+            self._fitted_title_px(),
+            self._has_room_for_y(),
+        )
+        size = f"{title_px}px"
         title = {"color": colors.text, "size": size, "justify": "left"}
         self._item.setTitle(escape(self._axes.title), **title)
         if names := self._signed_names():  # beside the title they hide nothing
             words = title_with_names(self._axes.title, names, colors)
             self._item.titleLabel.setText(words)
-        for side, words in (("left", self._axes.y), ("bottom", self._axes.x)):
+        y = self._axes.y if is_y_named else ""
+        for side, words in (("left", y), ("bottom", self._axes.x)):
             axis = self._item.getAxis(side)
             axis.setPen(pg.mkPen(colors.line))
             axis.setTextPen(pg.mkPen(colors.muted))

@@ -115,7 +115,8 @@ class QueuedListener(QObject):
     def on_camera(self, event: WorkerEvent, camera: int) -> None:
         """Forward an event of a camera."""
         if not isinstance(event, WorkerStopped):  # the connection closes besides
-            self._event_posted.emit(event, camera)
+            with suppress(RuntimeError):  # the program has ended meanwhile
+                self._event_posted.emit(event, camera)
 
     # On the thread of the GUI
 

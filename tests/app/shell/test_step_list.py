@@ -30,6 +30,13 @@ def test_several_closed_steps_show_one_common_reason() -> None:
     assert shown == [False, False, False, True, False]
 
 
+def test_no_reason_is_shown_where_the_page_says_what_is_missing() -> None:
+    steps = list_steps(STATUSES, now=1, is_reason_said=True)
+
+    assert not any(step.shows_reason for step in steps)
+    assert steps[3].why_closed == "Needs a camera."  # for who asks the step
+
+
 def test_going_back_keeps_what_is_done() -> None:
     complete = Status("Camera", complete=True, why_closed="")
 

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtGui import QFontMetricsF, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -15,8 +16,8 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.figures import arrow_scale, budget_figure
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.theme import DARK, LIGHT, apply_theme
-from lightpen_app.steps.review.plots_panel import BudgetPlot
+from lightpen_app.look.theme import DARK, LIGHT, TextSize, apply_theme, font
+from lightpen_app.steps.review.plots_panel import HEAD, BudgetPlot
 from lightpen_app.steps.review.residual_plots import (
     ArrowPlot,
     DotPlot,
@@ -326,6 +327,28 @@ def test_the_bars_of_a_budget_are_as_long_as_their_values(qtbot: QtBot) -> None:
     longest = max(lengths)
     others = [n for n in lengths if 0 < n < 0.9 * longest]
     assert max(others) == pytest.approx(longest / 4, abs=2)
+
+
+def test_the_names_of_a_budget_never_overlap(qtbot: QtBot) -> None:
+    names = (*ContributionName,)
+    plot = BudgetPlot(Axes("U"))
+    show(qtbot, plot)
+
+    plot.set_value(budget_figure([(name, 0.001, False) for name in names], 0.004, 0.01))
+
+    rows = 1 + len(plot.value().bars)  # and the limit
+    height = QFontMetricsF(font(TextSize.SMALL)).height()
+    assert plot.minimumHeight() >= HEAD + rows * height
+
+
+def test_the_name_of_an_axis_that_is_too_short_for_it_is_left_out(qtbot: QtBot) -> None:
+    plot = TracePlot(Axes("Uncertainty", "image", "U (k = 2) / mm"), [Curve("u_mm")])
+    label = plot.findChildren(pg.PlotWidget)[0].getPlotItem().getAxis("left").label
+    for height, is_named in ((240, True), (110, False), (240, True)):
+        show(qtbot, plot)
+        plot.resize(360, height)
+        QApplication.processEvents()
+        assert label.isVisible() is is_named
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:

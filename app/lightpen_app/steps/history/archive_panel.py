@@ -168,7 +168,8 @@ class ArchivePanel(Translated, QWidget):
 
     def _outcome_of(self, checked: ArchiveCheckResult | None) -> StatusMessage:
         if checked is None:
-            return StatusMessage(self.tr("Not checked since program start"))
+            words = self.tr("Not checked since program start")
+            return StatusMessage(words, Sign.RING, Tone.QUIET)
         counts = (checked.n_entries, checked.n_files)
         if checked.findings:
             text = self.tr("Changes detected. {0} entries and {1} files checked.")

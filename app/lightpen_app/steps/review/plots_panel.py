@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import QRectF, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
@@ -37,6 +37,8 @@ from lightpen_app.widgets.live_markers import CameraSwitch
 from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.tables import Figures, NumberTable
 
+HEAD = 4 * GRID  # px, above the bars
+
 
 class BudgetPlot(Figure):
     """Shows the parts of U as horizontal bars, with its limit."""
@@ -53,6 +55,8 @@ class BudgetPlot(Figure):
     def set_value(self, value: BudgetFigure) -> None:
         """Show another figure."""
         self._value = value
+        line = QFontMetricsF(font(TextSize.SMALL)).height()
+        self.setMinimumHeight(HEAD + round((len(value.bars) + 1) * line) + 2 * GRID)
         self._columns = {
             "part": tuple(bar.name for bar in value.bars),
             "expanded_uncertainty_mm": np.array([bar.value for bar in value.bars]),
@@ -69,7 +73,7 @@ class BudgetPlot(Figure):
             painter.setFont(small)
             area = QRectF(self.rect()).adjusted(GRID // 2, GRID // 2, -GRID, -GRID)
             painter.drawText(area, self._axes.title)
-            area.setTop(area.top() + 4 * GRID)
+            area.setTop(area.top() + HEAD)
             if self._value.bars:
                 bold = font(TextSize.SMALL, bold=True)
                 drawing = Drawing(small, bold, colors, 1.0, mm_text)

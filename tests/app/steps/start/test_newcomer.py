@@ -52,6 +52,15 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
 
 
 @pytest.mark.slow
+def test_the_first_view_asks_only_how_to_begin(open_wizard: "OpenWizard") -> None:
+    walker = open_wizard()
+
+    walker.until_says("Choose how to begin.")
+    assert not any(step.shows_reason for step in walker.window.steps())
+    assert not walker.tells("SIMULATED")
+
+
+@pytest.mark.slow
 def test_at_the_first_start_the_trial_is_seen_in_the_smallest_window(
     open_wizard: "OpenWizard",
 ) -> None:
