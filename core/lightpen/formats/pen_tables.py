@@ -149,7 +149,7 @@ def from_table(table: Table, units: str | None) -> PenContent:
     unit = agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
     with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
-    names = _LED_NAMES
+    names: tuple[str, ...] = _LED_NAMES
     if not any(name in names for name in bare.header) and bare.header[:1] != ("x",):
         names += bare.header[:1]  # what a measuring program calls its elements
     wanted = [names, *_COORDINATES, *(_NORMALS if with_normals else ())]

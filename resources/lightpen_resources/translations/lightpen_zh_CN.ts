@@ -4735,10 +4735,6 @@ needed</source>
 <context>
     <name>SwingPlots</name>
     <message>
-        <source>limit {0}</source>
-        <translation>限值 {0}</translation>
-    </message>
-    <message>
         <source>image</source>
         <translation>图像</translation>
     </message>
@@ -4781,6 +4777,10 @@ needed</source>
     <message>
         <source>The tip by all images so far, from its newest value. First estimates that are far off are cut off.</source>
         <translation>由至今全部图像得到的测头，相对于其最新值。最初偏离很远的估计不全部显示。</translation>
+    </message>
+    <message>
+        <source>limit {0} µm</source>
+        <translation>限值 {0} µm</translation>
     </message>
     <message>
         <source>achievable</source>

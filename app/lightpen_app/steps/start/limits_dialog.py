@@ -106,7 +106,6 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         fill(layout, self._signing, self._supervisor, self._new_password)
         fill(layout, self._fault, self._buttons)
         self.setMinimumWidth(98 * GRID)
-        self.resize(124 * GRID, self.sizeHint().height())
 
         # Connections
         self._supervisor.value_edited.connect(self._refresh)

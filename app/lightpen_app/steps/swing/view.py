@@ -357,8 +357,8 @@ class SwingPlots(Translated, QWidget):
         self._traces[3].plot.set_data(trace.n_images.astype(np.float64), *changes.T)
 
     def _retranslate(self) -> None:
-        words = "" if self._limit is None else f"{self._limit:g} \u00b5m"
-        limit = self.tr("limit {0}").format(words)
+        words = "" if self._limit is None else f"{self._limit:g}"
+        limit = self.tr("limit {0} \u00b5m").format(words)
         plot = self._traces[1].plot
         plot.set_limit(self._limit, limit)
         plot.set_names("U", self.tr("achievable"))
