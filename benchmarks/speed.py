@@ -24,12 +24,14 @@ from benchmarks.workers import Workers, elapsed_ms, median_ms
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.labelling.labels import Labels, label_spots, track_spots
+from lightpen.detection.labelling.labels import Labels, label_spots
 from lightpen.detection.observations import observe_centers, observe_images
 from lightpen.detection.pen_detection import (
+    Followed,
     PenDetection,
     detect_from_centers,
     detect_pen,
+    follow_spots,
 )
 from lightpen.detection.pose import fit_paper_poses, fit_poses
 from lightpen.estimation.calibrate import calibrate
@@ -162,7 +164,7 @@ def speed_rows(workers: Workers, data: Path | None) -> list[Row]:
             f"{RPG} 200",
         ),
         _row(
-            "labels of the same when tracking",
+            "labels and pose of the same when tracking",
             labels.tracking,
             "tracking labels",
             f"{RPG} 1",
@@ -294,15 +296,15 @@ def _label_times() -> _LabelTimes:
     rng = np.random.default_rng(3)
     views = [random_view(rng, n_missing=4, n_lamps=5) for _ in range(N_VIEWS)]
     turns = rotation_from_vector(rng.normal(0, TURN_ERROR, (N_VIEWS, 3)))
-    middle = PEN.leds.mean(axis=0)
+    middle, unseen = PEN.leds.mean(axis=0), np.full(PEN.n_leds, np.nan)
 
     def start(view: RandomView) -> Labels:
         return label_spots(view.spots, CAMERA, PEN)
 
-    def track(view: RandomView, turn: FloatArray) -> Labels:
+    def track(view: RandomView, turn: FloatArray) -> Followed | None:
         R = turn @ view.R
         t = view.t + (view.R - R) @ middle
-        return track_spots(view.spots, CAMERA, PEN, R, t)
+        return follow_spots(view.spots, CAMERA, PEN, R, t, unseen)
 
     starting = [elapsed_ms(partial(start, view)) for view in views]
     tracking = [

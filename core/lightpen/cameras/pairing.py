@@ -10,6 +10,7 @@ Recordings are paired by the numbers of their images.
 import time
 from collections import deque
 from dataclasses import replace
+from statistics import median
 from threading import Event, Lock
 from typing import Protocol
 
@@ -68,8 +69,10 @@ class FramePairs:
         """Use the times of a frame of camera 0 or 1 without pairing it."""
         own, other = self._times[c], self._times[1 - c]
         own.note(frame)
+        if other.last is None or not self._is_settled:
+            return
         period_ns = self._period_ns
-        if other.last is None or period_ns is None or not self._is_settled:
+        if period_ns is None:
             return
         first, second = (frame, other.last) if c == 0 else (other.last, frame)
         apart_ns = self._apart_ns(first, second)
@@ -191,7 +194,7 @@ class _Times:
     @property
     def period_ns(self) -> float | None:
         """Time between two frames; None until it is known."""
-        return float(np.median(self._gaps_ns)) if self._gaps_ns else None
+        return median(self._gaps_ns) if self._gaps_ns else None
 
     def note(self, frame: Frame) -> None:
         """Add the times of a frame."""

@@ -126,19 +126,23 @@ def _measured(
     frames = np.minimum(np.maximum(frames, 0), [width, height, width, height])
     light = stacked(image, frames)
     levels = _levels(light, frames, level)
-    background, contrast = levels.background, levels.contrast
-    foot = np.minimum(np.maximum(LOW_SIGMAS * noise / contrast, LOW), MAX_LOW)
-    low = np.rint(np.maximum(background + foot * contrast, floor))
-    high = np.maximum(background + HIGH * contrast, low + MIN_RAMP * contrast)
+    low, high = _ramp(levels, noise, floor)
     layers = np.empty((4, *light.shape), np.float32)
     soft, inner, weighted, lit = layers
-    np.subtract(light, _of_each(low), out=soft)
-    soft *= _of_each(255 / (high - low))
-    np.maximum(soft, 0, out=soft)
-    np.minimum(soft, 255, out=soft)
+    _soften(light, low, high, soft)
     regions, contours, others = _regions(soft, frames, boxes)
     inner[...] = _inside(soft > FULL)
     rings = _filled(soft, regions - frames[:, [0, 1, 0, 1]])
+    if rings:  # with half of their light on their flanks
+        levels.plateau[rings] = levels.top[rings]
+        low, high = _ramp(levels, noise, floor)
+        crests = np.empty((len(rings), *light.shape[1:]), np.float32)
+        _soften(light[rings], low[rings], high[rings], crests)
+        crests *= soft[rings] > 0
+        for k, crest in zip(rings, crests, strict=True):
+            soft[k] = crest
+            _is_filled(soft[k])
+    background, contrast = levels.background, levels.contrast
     inner[rings] = 0  # a ring shows no shading
     np.multiply(light, inner, out=weighted)
     light -= _of_each(background)
@@ -181,6 +185,23 @@ def _measured(
         discs = rows_of(discs, box)
         others = [other for other in others if are_enough[other[0]]]
     return Measured(discs, box, others)
+
+
+def _ramp(levels: Levels, noise: float, floor: float) -> tuple[FloatArray, FloatArray]:
+    """Return the intensities between which light counts in part."""
+    background, contrast = levels.background, levels.contrast
+    foot = np.minimum(np.maximum(LOW_SIGMAS * noise / contrast, LOW), MAX_LOW)
+    low = np.rint(np.maximum(background + foot * contrast, floor))
+    high = np.maximum(background + HIGH * contrast, low + MIN_RAMP * contrast)
+    return low, high
+
+
+def _soften(light: Reals, low: FloatArray, high: FloatArray, soft: Reals) -> None:
+    """Write light between two intensities, of 255, to an array."""
+    np.subtract(light, _of_each(low), out=soft)
+    soft *= _of_each(255 / (high - low))
+    np.maximum(soft, 0, out=soft)
+    np.minimum(soft, 255, out=soft)
 
 
 def _levels(light: Reals, frames: IntArray, level: float) -> Levels:

@@ -42,13 +42,26 @@ MIN_RAYS, MAX_RAYS = 32, 128
 # The unknowns of a ray are b, p0, p1, p0 d, p0 dsigma and p2. From afar p2 would lead
 # astray; in the end the blur is held.
 SHARPNESS, BEND = 4, 5
-ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
-# From the image before, whose shape and blur a disc still has nearly; the last is left
-# out where the rim is at rest.
-KNOWN_ROUNDS = ROUNDS[4:]
+CONVERGED = 0.05  # px
+
+
+class _Stage(NamedTuple):
+    """Rounds of a fit with the same unknowns, until all rims hardly move."""
+
+    unknowns: list[int]
+    n_rounds: int
+    rest: float  # px
+
+
+STAGES = (
+    _Stage([0, 1, 2, 3, 4], 3, 0.4),
+    _Stage([0, 1, 2, 3, 4, 5], 2, 0.1),
+    _Stage([0, 1, 2, 3, 5], 4, CONVERGED),
+)
+# From the image before, whose shape and blur a disc still has nearly.
+KNOWN_STAGES = (STAGES[1]._replace(n_rounds=1), STAGES[2])
 RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
-CONVERGED = 0.05  # px
 INSIDE, OUTSIDE = 3.0, 3.0  # reach of a ray in standard deviations of the blur
 MORE_INSIDE, MORE_OUTSIDE = 2.5, 1.0  # px beyond that
 MAX_INSIDE = 0.5  # of the shorter semi-axis: deeper, brightness is no parabola
@@ -187,35 +200,36 @@ def _fit(
     ellipses, sigmas = _Ellipses(starts.centers[left], roots), starts.sigmas[left]
     if not is_known:
         ellipses, sigmas = _onto_steepest(image, ellipses)
-    rounds = KNOWN_ROUNDS if is_known else ROUNDS
-    for n, unknowns in enumerate(rounds, start=1):
-        shorter = ellipses.semi_axes[1]
-        sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
-        spacing = COARSE_SPACING if SHARPNESS in unknowns else RAY_SPACING
-        rays = _rays(ellipses, spacing)
-        edges = _edges(image, rays, sigmas, shorter, unknowns)
-        steps = _steps(rays, edges.places, edges.weights)
-        moves = (rays.moves @ steps[..., None])[..., 0]
-        longest = np.abs(moves).max(axis=1)
-        alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
-        shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
-        ellipses = _moved(ellipses, steps * shares[:, None])
-        at_rest = longest < CONVERGED
-        ends = is_known and SHARPNESS not in unknowns
-        ended = alive & ((at_rest & ends) | (n == len(rounds)))
-        if ended.any():
-            are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
-            sharp = ended & (sigmas < MAX_SIGMA * shorter)
-            found = left[sharp]
-            fits.centers[found] = ellipses.centers[sharp]
-            fits.shapes[found] = _shapes(ellipses.roots[sharp], sigmas[sharp])
-            fits.sigmas[found] = sigmas[sharp]
-            fits.are_whole[found] = (are_even & at_rest)[sharp]
-            alive &= ~ended
-        sigmas = sigmas + edges.blurs
-        if not alive.all():
-            left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
-            if not len(left):
+    for unknowns, n_rounds, rest in KNOWN_STAGES if is_known else STAGES:
+        for n_left in reversed(range(n_rounds)):
+            shorter = ellipses.semi_axes[1]
+            sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
+            spacing = COARSE_SPACING if SHARPNESS in unknowns else RAY_SPACING
+            rays = _rays(ellipses, spacing)
+            edges = _edges(image, rays, sigmas, shorter, unknowns)
+            steps = _steps(rays, edges.places, edges.weights)
+            moves = (rays.moves @ steps[..., None])[..., 0]
+            longest = np.abs(moves).max(axis=1)
+            alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
+            shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
+            ellipses = _moved(ellipses, steps * shares[:, None])
+            at_rest = longest < rest
+            if SHARPNESS not in unknowns:
+                ended = alive & (at_rest | (n_left == 0))
+                are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
+                sharp = ended & (sigmas < MAX_SIGMA * shorter)
+                found = left[sharp]
+                fits.centers[found] = ellipses.centers[sharp]
+                fits.shapes[found] = _shapes(ellipses.roots[sharp], sigmas[sharp])
+                fits.sigmas[found] = sigmas[sharp]
+                fits.are_whole[found] = (are_even & at_rest)[sharp]
+                alive &= ~ended
+            sigmas = sigmas + edges.blurs
+            if not alive.all():
+                left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
+                if not len(left):
+                    return
+            if at_rest[alive].all():
                 break
 
 

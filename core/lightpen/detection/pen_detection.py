@@ -5,9 +5,8 @@ fits the pose, `lightpen.detection.observations` for many at once.
 
 The pen is followed from image to image by the spots nearest to where its LEDs were.
 Where every LED moved by less than half the way to its neighbour, each spot is of the
-LED it is nearest to; the fit of the pose then checks all of them at once. Anything
-else, a fast hand, a stray light near an LED, two LEDs in one spot, is left to the
-search of `lightpen.detection.labelling.labels.track_spots`.
+LED it is nearest to; the fit of the pose then drops what is none, such as a lamp near a
+hidden LED. Anything else, a fast hand, too few LEDs, is left to a search from nothing.
 """
 
 from collections.abc import Sequence
@@ -19,28 +18,33 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.labelling.constellation import UNWHOLE, certain_leds
-from lightpen.detection.labelling.hypotheses import MAX_SHIFT
+from lightpen.detection.labelling.constellation import (
+    FEWEST_LEDS,
+    UNWHOLE,
+    certain_leds,
+)
 from lightpen.detection.labelling.labels import (
+    MAX_RMS_OF_FEWEST_AMONG_OTHERS,
     Labels,
     LabelStatus,
     label_spots,
-    track_spots,
 )
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS, ImagePose, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason
+from lightpen.detection.robust_residuals import CAUCHY_WIDTH
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
 
+MAX_SHIFT = 45.0  # px, of an LED from image to image
 ROOM = 3.0  # radii of a disc from its centre to the border of what is read
 
 UNAMBIGUOUS = 0.4  # of the distance of two LEDs, that one may have moved
 MAX_TURN = 0.25  # rad, from image to image
 MAX_SIGMA = 0.3  # px
-LEAST_WEIGHT = 0.5  # of an LED: residuals of four standard deviations
+STRAY = (0.3, 1.0)  # px, from its LED, least and most, if four standard deviations
 MAX_GROWTH = 1.5  # of an area from image to image
 MAX_OFF_CENTER = 0.5  # radii, of a merged or cut spot from its LED
 
@@ -177,23 +181,19 @@ def detect_pen(
     if not camera.fits(image):
         return unseen(pen, Reason.WRONG_SIZE)
     try:
-        if is_followed and before is not None and before.has_pose:
-            leds = pen.leds @ before.rotation.T + before.translation
-            there = camera.project(leds)
-            radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
-            window = _window(camera, there, radius)
-            spots = detect_spots(
-                *(image, mask),
-                full_scale=full_scale,
-                window=window,
-                before=before.spots,
-            )
-            followed = _followed(spots, camera, pen, before, there)
+        seen = None if before is None else before.spots
+        search = partial(detect_spots, image, mask, full_scale=full_scale, before=seen)
+        if before is not None and before.has_pose and is_followed:
+            spots = search(window=_window(camera, pen, before))
+            followed = _followed(spots, camera, pen, before)
             if followed is not None:
                 return followed
-        seen = None if before is None else before.spots
-        spots = detect_spots(image, mask, full_scale=full_scale, before=seen)
-        labels = _label(spots, camera, pen, before)
+        spots = search()
+        if before is not None and before.has_pose:
+            followed = _followed(spots, camera, pen, before)
+            if followed is not None:
+                return followed
+        labels = label_spots(spots, camera, pen)
         detection = detections_of([spots], [labels], camera)[0]
         return _fitted(detection, camera, pen)
     except UNFORESEEN:
@@ -265,16 +265,15 @@ def unseen(pen: Pen, reason: Reason) -> PenDetection:
 
 
 def _followed(
-    spots: Spots, camera: Camera, pen: Pen, before: PenDetection, there: FloatArray
+    spots: Spots, camera: Camera, pen: Pen, before: PenDetection
 ) -> PenDetection | None:
     """Return the detection where LEDs moved little since the image before."""
-    if before.spots is None or before.labels is None:
-        return None
-    labelled = before.labels.spot >= 0
     areas = np.full(pen.n_leds, np.nan)
-    areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
+    if before.spots is not None and before.labels is not None:
+        labelled = before.labels.spot >= 0
+        areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
     pose = before.rotation, before.translation
-    found = follow_spots(spots, camera, pen, *pose, there, areas)
+    found = follow_spots(spots, camera, pen, *pose, areas)
     if found is None:
         return None
     pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)
@@ -289,25 +288,23 @@ def follow_spots(
     pen: Pen,
     rotation: FloatArray,
     translation: FloatArray,
-    there: FloatArray,
     areas: FloatArray,
 ) -> Followed | None:
     """Return labels and pose of an image, given those of the image before.
 
-    None where anything but small motion is seen.
+    None where anything but small motion is seen. Five LEDs are enough for a pose that
+    fits them closely.
 
     Parameters
     ----------
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen of the image before, mm.
-    there : (L, 2) array
-        LEDs of that pose, px.
     areas : (L,) array
         Of the spots there, px^2; NaN where an LED was not seen.
     """
     if not len(spots) or np.isfinite(spots.tiny_width):
         return None
-    x, y = there.T
+    x, y = camera.project(pen.leds @ rotation.T + translation).T
     apart = np.hypot(x[:, None] - x, y[:, None] - y)
     np.fill_diagonal(apart, np.inf)
     gaps = np.hypot(x[:, None] - spots.centers[:, 0], y[:, None] - spots.centers[:, 1])
@@ -316,27 +313,36 @@ def follow_spots(
     mutual = gaps.argmin(axis=0)[spot] == leds
     labelled = mutual & (gaps[leds, spot] < UNAMBIGUOUS * apart.min(axis=1))
     whole = labelled & (spots.flaws[spot] & UNWHOLE == 0)
-    if np.count_nonzero(whole) < certain_leds(pen):
-        return None
-    growth = spots.areas[spot] / areas  # NaN where an LED was not seen
-    if np.any(whole & ((growth > MAX_GROWTH) | (growth < 1 / MAX_GROWTH))):
-        return None
     seen, own = np.full((pen.n_leds, 2), np.nan), spot[labelled]
     seen[labelled] = centers_from_centroids(
         camera, spots.centers[own], spots.shapes[own]
     )
-    pixels = np.where(whole[:, None], seen, np.nan)
-    sigmas = np.where(whole, spots.sigmas[spot], np.nan)
-    pose = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
-    turned = np.vdot(pose.rotation, rotation) < 1 + 2 * cos(MAX_TURN)
-    is_poor = pose.sigma > MAX_SIGMA or (pose.weights[whole] < LEAST_WEIGHT).any()
-    if turned or is_poor:
+    while True:
+        if np.count_nonzero(whole) < FEWEST_LEDS:
+            return None
+        pixels = np.where(whole[:, None], seen, np.nan)
+        sigmas = np.where(whole, spots.sigmas[spot], np.nan)
+        pose = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
+        off = CAUCHY_WIDTH * pose.sigma * np.sqrt(1 / pose.weights[whole] - 1)
+        stray = np.zeros_like(whole)
+        stray[whole] = off > np.clip(CAUCHY_WIDTH * pose.sigma, *STRAY)
+        if not stray.any():
+            break
+        labelled, whole = labelled & ~stray, whole & ~stray
+    is_certain = np.count_nonzero(whole) >= certain_leds(pen)
+    most = MAX_SIGMA if is_certain else MAX_RMS_OF_FEWEST_AMONG_OTHERS
+    growth = spots.areas[spot] / areas  # NaN where an LED was not seen
+    if np.any(whole & ((growth > MAX_GROWTH) | (growth < 1 / MAX_GROWTH))):
         return None
+    turned = np.vdot(pose.rotation, rotation) < 1 + 2 * cos(MAX_TURN)
+    if turned or pose.sigma > most:
+        return None
+    seen = np.where(labelled[:, None], seen, np.nan)
     # A merged or cut spot is of an LED if it is on its disc.
     if np.any(labelled & ~whole):
         placed = camera.project(pen.leds @ pose.rotation.T + pose.translation)
         off = np.linalg.norm(seen - placed, axis=1)
-        radii = np.sqrt(np.nanmedian(areas) / np.pi)
+        radii = np.sqrt(np.median(spots.areas[spot[labelled]]) / np.pi)
         labelled &= whole | (off < MAX_OFF_CENTER * radii)
         seen = np.where(labelled[:, None], seen, np.nan)
     labels = Labels(
@@ -350,22 +356,15 @@ def follow_spots(
     return Followed(labels, seen, pose)
 
 
-def _window(camera: Camera, there: FloatArray, radius: float) -> PixelBox:
-    """Return the region of LEDs of a radius that hardly moved, with a margin, px."""
+def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
+    """Return the region of LEDs that hardly moved, with a margin, px."""
+    leds = pen.leds @ before.rotation.T + before.translation
+    there = camera.project(leds)
+    radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
     (left, top), (right, bottom) = there.min(axis=0), there.max(axis=0)
     around = PixelBox(floor(left), floor(top), ceil(right), ceil(bottom))
     room = ceil(MAX_SHIFT + ROOM * radius)
     return around.grown(room, (camera.height, camera.width))
-
-
-def _label(
-    spots: Spots, camera: Camera, pen: Pen, before: PenDetection | None
-) -> Labels:
-    if before is not None and before.has_pose:
-        tracked = track_spots(spots, camera, pen, before.rotation, before.translation)
-        if tracked.reason is LabelStatus.LABELLED:
-            return tracked
-    return label_spots(spots, camera, pen)
 
 
 def _detection_of(spots: Spots, labels: Labels, seen: FloatArray) -> PenDetection:

@@ -33,8 +33,7 @@ def followed(spots: Spots | None) -> Followed | None:
     assert BEFORE.labels is not None
     areas = BEFORE.spots.areas[BEFORE.labels.spot]
     R, t = BEFORE.rotation, BEFORE.translation
-    there = SCENE.camera.project(SCENE.pen.leds @ R.T + t)
-    return follow_spots(spots, SCENE.camera, SCENE.pen, R, t, there, areas)
+    return follow_spots(spots, SCENE.camera, SCENE.pen, R, t, areas)
 
 
 def test_labels_and_pose_are_those_of_a_search() -> None:
@@ -48,11 +47,16 @@ def test_labels_and_pose_are_those_of_a_search() -> None:
     np.testing.assert_allclose(found.seen, NOW.seen_pixels, atol=1e-9)
 
 
-def test_a_foreign_light_beside_an_led_is_left_to_a_search() -> None:
+def test_a_foreign_light_beside_an_led_is_not_taken_for_it() -> None:
     assert NOW.spots is not None
+    assert NOW.labels is not None
     centers = NOW.spots.centers.copy()
     centers[3] += [2.0, 0.0]
-    assert followed(replace(NOW.spots, centers=centers)) is None
+    found = followed(replace(NOW.spots, centers=centers))
+    assert found is not None
+    wanted = np.where(NOW.labels.spot == 3, -1, NOW.labels.spot)
+    np.testing.assert_array_equal(found.labels.spot, wanted)
+    np.testing.assert_allclose(found.labels.R, NOW.rotation, atol=3e-4)
 
 
 def test_leds_that_changed_their_size_are_left_to_a_search() -> None:
@@ -69,7 +73,7 @@ def test_motion_beyond_half_the_way_to_the_next_led_is_left_to_a_search() -> Non
 def test_too_few_whole_spots_are_left_to_a_search() -> None:
     assert NOW.spots is not None
     flaws = NOW.spots.flaws.copy()
-    flaws[:5] = SpotFlaw.CUT
+    flaws[:6] = SpotFlaw.CUT
     assert followed(replace(NOW.spots, flaws=flaws)) is None
 
 

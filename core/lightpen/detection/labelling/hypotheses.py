@@ -253,9 +253,6 @@ LOOKALIKE_REACH = 25.0  # px, of the pairing
 LOOKALIKE_STEPS = 3
 MAX_LOOKALIKE_RMS = 3.0  # px, beyond which a pose is no lookalike
 
-MAX_SHIFT = 45.0  # px, of an LED from its prediction
-SHIFT_TOLERANCE = 20.0  # px, once the shift common to all is taken off
-
 
 @dataclass(frozen=True)
 class SearchEffort:
@@ -315,23 +312,6 @@ def lookalike_poses(
     turned = turned.of(turned.n_explained >= best.n_explained[one] - 1)
     fitted = fit(sight, pen, join([flipped, turned]), n_steps=LOOKALIKE_STEPS)
     return fitted.of(fitted.rms < MAX_LOOKALIKE_RMS)
-
-
-def shifted_poses(
-    sight: SpotArrays, pen: Constellation, R: FloatArray, t: FloatArray
-) -> Candidates:
-    """Return variants of a predicted cam_from_pen, shifted so that LEDs meet spots."""
-    leds = pen.leds @ R.T + t
-    here = leds[:, :2] * (sight.focal / leds[:, 2:])
-    shifts = sight.points[0] - here[:, None]
-    near = np.einsum("lsi,lsi->ls", shifts, shifts) < MAX_SHIFT**2
-    depths = np.broadcast_to(leds[:, 2:], near.shape)[near]
-    translations = np.broadcast_to(t, (len(depths), 3)).copy()
-    translations[:, :2] += shifts[near] * (depths / sight.focal)[:, None]
-    image = np.zeros(len(depths), dtype=np.int64)
-    rotations = np.broadcast_to(R, (len(depths), 3, 3))
-    matched = match(sight, pen, image, rotations, translations, SHIFT_TOLERANCE)
-    return _most_explaining(matched, SHIFT_TOLERANCE, 2)
 
 
 def _spot_triples(

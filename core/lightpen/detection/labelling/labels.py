@@ -25,7 +25,6 @@ from lightpen.detection.labelling.constellation import (
     UNWHOLE,
     Constellation,
     SpotArrays,
-    certain_leds,
     constellation_of,
     spot_arrays,
 )
@@ -34,7 +33,6 @@ from lightpen.detection.labelling.hypotheses import (
     first_of_each,
     lookalike_poses,
     poses_from_triples,
-    shifted_poses,
 )
 from lightpen.detection.labelling.matching import (
     AREA_RANGE,
@@ -65,8 +63,6 @@ HYPOTHESES_AT_ONCE = 4000
 MAX_OFF_CENTER = 0.5  # of the radius, of a cut disc: half a disc is off by 0.42
 DISPLACED_REACH = 8.0  # px, of an LED from its place in the pen file
 MIN_DISPLACED = 5  # images that show it, and half of all
-
-MAX_PREDICTION_ERROR = 0.25  # rad
 
 
 class LabelStatus(StrEnum):
@@ -159,32 +155,6 @@ def label_spots(spots: Spots, camera: Camera, pen: Pen) -> Labels:
     label_images : For many images, at a tenth of the time for each.
     """
     return label_images([spots], camera, pen)[0]
-
-
-def track_spots(
-    spots: Spots, camera: Camera, pen: Pen, R: FloatArray, t: FloatArray
-) -> Labels:
-    """Label the LEDs of an image by a predicted cam_from_pen, (3, 3) and (3,), mm.
-
-    LEDs must be within some 30 px, the rotation within some degrees. Refused where the
-    prediction does not lead to a believable labelling.
-    """
-    constellation = constellation_of(pen, FEWEST_LEDS)
-    n_whole = int(np.count_nonzero(spots.flaws & UNWHOLE == 0))
-    if n_whole < constellation.min_leds:
-        return _refused(
-            pen.n_leds, LabelStatus.TOO_FEW if len(spots) else LabelStatus.NO_SPOTS
-        )
-    sight = spot_arrays([spots], camera, constellation.radius)
-    candidates = shifted_poses(sight, constellation, R, t)
-    settled = settle(sight, constellation, candidates)
-    best = _best(sight, constellation, settled)
-    if np.any(settled.n_explained[best] < certain_leds(pen)):
-        settled, best = _with_lookalikes(sight, constellation, settled)
-    label = _judge(sight, constellation, settled, best, [spots])[0]
-    if np.sum(label.R * R) < 1 + 2 * np.cos(MAX_PREDICTION_ERROR):
-        return _refused(pen.n_leds, LabelStatus.NO_FIT)
-    return label
 
 
 def _is_five(spots: Spots, labels: Labels, pen: Constellation) -> bool:
