@@ -5972,6 +5972,10 @@ needed</source>
         <translation>{n_images} 幅图像中只有 {n_used} 幅对应同一测头位置。请将测头压入锥孔，夹紧锥孔和相机，锁定变焦和对焦，然后重新摆动。</translation>
     </message>
     <message>
+        <source>Only {n_used} of {n_poses} poses agree on one tip and pivot: the tip was replaced or slipped, or cone or tracker moved. The others are {others}. Calibrate each part from a file of its own.</source>
+        <translation>{n_poses} 个位姿中只有 {n_used} 个对应同一测头和支点：测头被更换或松动，或者锥孔或跟踪器移动过。其余为 {others}。请将各部分放在单独的文件中分别标定。</translation>
+    </message>
+    <message>
         <source>Operation not permitted</source>
         <translation>不允许的操作</translation>
     </message>
@@ -6698,6 +6702,10 @@ needed</source>
     <message>
         <source>{n_leds} LEDs in {n_frames} frames of {name} are not seen: their centres are empty, NaN, (0, 0) or (-1, -1).</source>
         <translation>{name} 的 {n_frames} 帧中有 {n_leds} 个 LED 未检测到：其中心为空、NaN、(0, 0) 或 (-1, -1)。</translation>
+    </message>
+    <message>
+        <source>{n_left_out} of {n_poses} poses are outliers and were excluded: {poses}. Check the tracking for disturbances, and whether tip, cone or tracker moved.</source>
+        <translation>{n_poses} 个位姿中有 {n_left_out} 个为离群值，已剔除：{poses}。请检查跟踪是否受到干扰，以及测头、锥孔或跟踪器是否移动过。</translation>
     </message>
     <message>
         <source>{n_lost} of {n_poses} poses are lost and left out.</source>
@@ -7524,10 +7532,6 @@ needed</source>
         <translation>{run} 的全部测点都在 {extent:.3f} mm 之内：同一端被重复触测，另一端没有触测。请触测两端。</translation>
     </message>
     <message>
-        <source>All poses were used, so the tip lies between both.</source>
-        <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
-    </message>
-    <message>
         <source>An internal error occurred, and the verification is paused. Results so far are kept; continue, or start over.</source>
         <translation>发生内部错误，验证已暂停。目前的结果已保留；请继续，或重新开始。</translation>
     </message>
@@ -7562,10 +7566,6 @@ needed</source>
     <message>
         <source>Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.</source>
         <translation>两台相机同时看到标定板的视图有 {n_pairs} 组，至少需要 {least} 组。请补充两台相机都能看到整块板的视图。</translation>
-    </message>
-    <message>
-        <source>Calibrate each from a separate file.</source>
-        <translation>请将两组分别存为文件，各自标定。</translation>
     </message>
     <message>
         <source>Camera {camera} and another camera see the pen together at {n_pairs} of {n_moments} instants; {needed} are needed for the extrinsics. Give simultaneous images the same name, and point all cameras at the pen.</source>
@@ -8464,10 +8464,6 @@ needed</source>
         <translation>相机组文件中相机 {camera} 的位姿与图像相差 {angle:.1f}° 和 {distance:.0f} mm。</translation>
     </message>
     <message>
-        <source>The poses belong to two tips, {distance:.2f} mm apart in the pen frame: the tip was replaced or slipped in its holder. First tip: poses {first}. Second tip: poses {second}. {consequence}</source>
-        <translation>这些位姿属于两个测头，在光笔上相距 {distance:.2f} mm，似乎测头被更换过，或在夹持处松动移位。一组：位姿 {first}。另一组：位姿 {second}。{consequence}</translation>
-    </message>
-    <message>
         <source>The poses have no common tip: the best fit scatters by {scatter:.0f} mm, with the poses {movement:.0f} mm apart. Check that they belong to one pen swung on its tip, that they are cam_from_pen, and that rotations and translations belong together.</source>
         <translation>这些位姿没有共同的测头：最佳结果的散布为 {scatter:.0f} mm，而位姿本身彼此相距 {movement:.0f} mm。请检查：位姿是否来自同一支绕测头摆动的光笔，是否以 cam_from_pen 给出，旋转与平移是否对应。</translation>
     </message>
@@ -8490,10 +8486,6 @@ needed</source>
     <message>
         <source>The result is outside the limits of this station. {why} A supervisor&apos;s approval and a reason are needed.</source>
         <translation>结果超出本工位的限值。{why}须由主管批准并说明理由。</translation>
-    </message>
-    <message>
-        <source>The result is the tip of the first group, which is larger.</source>
-        <translation>所得测头属于位姿较多的前一组。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to continue without it.</source>
@@ -8630,10 +8622,6 @@ needed</source>
     <message>
         <source>The tip moved in its seat with the tilt by about {distance:.4f} mm; U includes this. Check tip and cone for form error, wear and dirt.</source>
         <translation>测头随倾斜在锥孔中移动约 {distance:.4f} mm，已计入 U。请检查测头和锥孔的形状误差、磨损和污物。</translation>
-    </message>
-    <message>
-        <source>The tip rested on two points, {distance:.2f} mm apart: cone or tracker moved. First point: poses {first}. Second point: poses {second}. {consequence}</source>
-        <translation>测头曾停在两个点上，相距 {distance:.2f} mm，似乎锥孔或跟踪仪移动过。一个点：位姿 {first}。另一个点：位姿 {second}。{consequence}</translation>
     </message>
     <message>
         <source>The tip rests {distance:.2f} mm from its previous position. Put it back into the cone; check that the cone is clamped.</source>
@@ -9158,10 +9146,6 @@ needed</source>
     <message>
         <source>{n_leds} LEDs are seen; at least {needed} are needed. Keep the whole pen in view, switch on all LEDs, and check exposure and focus.</source>
         <translation>看到 {n_leds} 个 LED；至少需要 {needed} 个。请使整支光笔在视野内，点亮所有 LED，并检查曝光和对焦。</translation>
-    </message>
-    <message>
-        <source>{n_left_out} of {n_poses} poses are outliers and were excluded: {poses}. Check the tracking for disturbances.</source>
-        <translation>{n_poses} 个位姿中有 {n_left_out} 个为离群值，已剔除：{poses}。请检查跟踪是否受到干扰。</translation>
     </message>
     <message>
         <source>{n_named} of {n_views} images are rotated by 180° ({names}). Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>

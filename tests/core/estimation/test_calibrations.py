@@ -129,7 +129,7 @@ def test_u_predicted_from_linear_equations_is_that_of_the_calibration(
     state, joint = found.bundle.state, found.joint
     prediction = predict_uncertainty(
         state.rig, state.pen, pixels, joint, joint.sigma, USUAL
-    ).predicted(joint, joint.sigma, USUAL)
+    )
 
     ratio = prediction.uncertainty / found.budget.expanded_uncertainty[:3].max()
     # One linear step knows the seat less well, and too much is said rather than less.

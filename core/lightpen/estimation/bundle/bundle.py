@@ -27,14 +27,18 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.image_fields import FieldName, ImageField, SeatModes
+from lightpen.estimation.bundle.image_fields import (
+    FieldName,
+    ImageField,
+    SeatModes,
+    seat_modes_of,
+)
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
     BundleState,
     CameraView,
     Eliminated,
-    NormalEquations,
     eliminate,
 )
 from lightpen.estimation.bundle.priors import Priors
@@ -52,6 +56,7 @@ CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
 FINDING_PASSES = 4  # at most, in which standard deviations are found; then they stand
 MAX_PASSES = 20
+SEAT_ROUNDS = 2  # of one step, in which the jitter is found beside other errors
 OPPOSED = 0.5  # share of the last step; a step back by more is halved
 
 
@@ -323,6 +328,31 @@ def solved_at_rest(bundle: Bundle, pixels: FloatArray) -> tuple[Solved, FloatArr
     return solved, solved.values - now.values
 
 
+def one_step(
+    pixels: FloatArray,
+    state: BundleState,
+    priors: Priors,
+    used: BoolArray,
+    sigma: float,
+) -> Bundle:
+    """Return the adjustment after one step about a state, all of whose LEDs are known.
+
+    ``pixels`` (N, C, L, 2), px, are as in `fit_bundle`; those ``used`` (N, C, L) have a
+    noise ``sigma``, px.
+    """
+    unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
+    views = unknowns.views_at(state, pixels)
+    values = np.zeros(unknowns.number)
+    now = _Linearised(state, values, views, used, NO_COMPONENTS, sigma)
+    solved = _solve(unknowns, now, sigma, with_components=False)
+    for _ in range(SEAT_ROUNDS):
+        # The jitter first: without it, other random effects would absorb it.
+        jitter = _jitter_beside(unknowns, now, solved, sigma)
+        now = now._replace(components=solved.components._replace(jitter=jitter))
+        solved = _solve(unknowns, now, sigma, with_components=True)
+    return _bundle_of(unknowns, state, used, solved._replace(sigma=sigma), sigma)
+
+
 def _started(
     unknowns: Unknowns,
     start: BundleState,
@@ -397,13 +427,19 @@ def _jitter_beside(
     unknowns: Unknowns, now: _Linearised, solved: Solved, weight_sigma: float
 ) -> RandomEffect:
     """Estimate the jitter of the seat about a solution."""
-    without = solved.eliminated
+    each = solved.eliminated
     if solved.components.jitter.covariance is not None:
-        without = eliminate(now.views, now.used, weight_sigma)
+        each = eliminate(now.views, now.used, weight_sigma)
     seen = np.asarray(now.used.any(axis=(1, 2)))
-    spread = unknowns.sensitivity(without.cone_rows)
-    change = solved.values - now.values
-    return jitter_of(unknowns, without, spread, seen, change, solved.covariance)
+    step, shifts = unknowns.step(solved.values - now.values)
+    own = each.cone_rows[seen, :, :N_CONE]
+    right = each.cone_right - each.cone_rows @ step
+    right = right[seen] - np.einsum("nij,nj->ni", own, shifts[seen])
+    by_image = np.linalg.inv(own) @ unknowns.sensitivity(each.cone_rows)[seen]
+    # One product of all images is four times as fast as one of each.
+    spread = by_image.reshape(-1, unknowns.number) @ solved.covariance
+    leverage = spread.reshape(by_image.shape) @ np.swapaxes(by_image, 1, 2)
+    return find_jitter(own, right, leverage)
 
 
 def _held_by_state(unknowns: Unknowns, values: FloatArray) -> FloatArray:
@@ -424,7 +460,7 @@ def _bundle_of(
     jitter, eliminated = solved.components.jitter, solved.eliminated
     by_seat = eliminated.turn_by_step[:, N_TURN:]
     rows = eliminated.cone_rows if jitter.covariance is None else by_seat
-    significant, insignificant = jitter_matrices(jitter, unknowns.sensitivity(rows))
+    significant, insignificant = _jitter_matrices(jitter, unknowns.sensitivity(rows))
     return Bundle(
         unknowns=unknowns,
         state=state,
@@ -444,7 +480,7 @@ def _bundle_of(
     )
 
 
-def jitter_matrices(
+def _jitter_matrices(
     jitter: RandomEffect, rows: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return ``jitter_information`` and ``insignificant_jitter`` of a `Bundle`.
@@ -515,39 +551,3 @@ def _n_eliminated(
     left = each.nuisance_covariance[:, N_TURN:, N_TURN:]
     freedom = N_CONE - np.einsum("nij,ji->n", left, known)
     return float(N_TURN * n_images + freedom.sum())
-
-
-def jitter_of(
-    unknowns: Unknowns,
-    each: NormalEquations,
-    spread: FloatArray,
-    seen: BoolArray,
-    change: FloatArray,
-    covariance: FloatArray,
-) -> RandomEffect:
-    """Estimate the jitter of the seat, which differs from image to image.
-
-    Parameters
-    ----------
-    each : NormalEquations
-        Without any jitter.
-    spread : (N, 3, p) array
-        Their rows of the cone by the unknowns.
-    seen : (N,) array of bool
-        Images that show anything.
-    change : (p,) array
-        Of the unknowns, that solves these equations.
-    covariance : (p, p) array
-        Of the unknowns.
-    """
-    step, shifts = unknowns.step(change)
-    rows = each.cone_rows[seen]
-    own = rows[..., :N_CONE]
-    right = each.cone_right - each.cone_rows @ step
-    right = right[seen] - np.einsum("nij,nj->ni", own, shifts[seen])
-    noise = np.linalg.inv(own)
-    by_image = noise @ spread[seen]
-    # One product of all images is four times as fast as one of each.
-    spread_out = by_image.reshape(-1, len(covariance)) @ covariance
-    leverage = spread_out.reshape(by_image.shape) @ np.swapaxes(by_image, 1, 2)
-    return find_jitter(own, right, leverage)

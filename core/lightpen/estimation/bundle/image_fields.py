@@ -31,7 +31,6 @@ class SeatModes(NamedTuple):
     """Weights of the modes in each of N images."""
 
     lean: FloatArray  # (N, 7), of the seat, see `tilt_modes`
-    oval: FloatArray  # (21, 2), moves in these modes by an oval seat, see `oval_seat`
     drift: FloatArray  # (N, D), of the cone, see `drift_modes`
 
 
@@ -40,8 +39,7 @@ def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> Se
 
     ``shifts`` as in `drift_modes`.
     """
-    lean, oval = tilt_modes(rotations), oval_seat(rotations)
-    return SeatModes(lean, oval, drift_modes(len(rotations), shifts))
+    return SeatModes(tilt_modes(rotations), drift_modes(len(rotations), shifts))
 
 
 def drift_modes(n_images: int, shifts: FloatArray | None = None) -> FloatArray:
@@ -62,24 +60,16 @@ def tilt_modes(rotations: FloatArray) -> FloatArray:
     Cosine and sine of one to three waves round the cone, and the tilt, less their
     means, each of mean square 1 (or 0). Rotations (N, 3, 3) are rig_from_pen.
     """
-    forms, sizes = _lean(rotations)
-    return np.asarray(forms / np.where(sizes > 0, sizes, 1.0))
-
-
-def oval_seat(rotations: FloatArray) -> FloatArray:
-    """Return the moves in the modes of `tilt_modes` by an oval seat, (21, 2).
-
-    A ball or cone with two lobes, 1 mm off the circle, moves the tip away from the axis
-    by equation (7) with a = 1 mm: one wave and three waves round the cone. The two
-    columns are the cosine and sine of twice the phase p. Rotations (N, 3, 3) are
-    rig_from_pen.
-    """
-    _, sizes = _lean(rotations)
-    cos1, sin1, _, _, cos3, sin3, _ = np.eye(len(sizes)) * sizes
-    right, away, _ = axes_of_cone(rotations)
-    cosine = np.outer(cos1 + cos3, right) + np.outer(sin3 - sin1, away)
-    sine = np.outer(sin1 + sin3, right) + np.outer(cos1 - cos3, away)
-    return np.stack([0.5 * cosine.ravel(), 0.5 * sine.ravel()], axis=1)
+    right, away, _ = axes_of_cone(rotations) @ rotations[:, :, 1].T
+    radius = np.hypot(right, away)
+    weight = radius / (radius + FULL_LEAN)
+    angle = np.arctan2(away, right)
+    waves = [f(n * angle) * weight for n in (1, 2, 3) for f in (np.cos, np.sin)]
+    forms = np.stack([*waves, weight**2], axis=1)
+    forms -= forms.mean(axis=0)
+    sizes = np.sqrt(np.mean(forms**2, axis=0))
+    is_there = sizes > SMALLEST_SEAT
+    return np.where(is_there, forms / np.where(is_there, sizes, 1.0), 0.0)
 
 
 def axes_of_cone(rotations: FloatArray) -> FloatArray:
@@ -97,20 +87,6 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
     right = most_across - (most_across @ along) * along
     right /= np.linalg.norm(right)
     return np.array([right, skew(along) @ right, along])
-
-
-def _lean(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the seat modes less their means, (N, 7), and their sizes, (7,)."""
-    right, away, _ = axes_of_cone(rotations) @ rotations[:, :, 1].T
-    radius = np.hypot(right, away)
-    weight = radius / (radius + FULL_LEAN)
-    angle = np.arctan2(away, right)
-    waves = [f(n * angle) * weight for n in (1, 2, 3) for f in (np.cos, np.sin)]
-    forms = np.stack([*waves, weight**2], axis=1)
-    forms -= forms.mean(axis=0)
-    sizes = np.sqrt(np.mean(forms**2, axis=0))
-    is_there = sizes > SMALLEST_SEAT
-    return np.where(is_there, forms, 0.0), np.where(is_there, sizes, 0.0)
 
 
 DEGREE = 6  # of the polynomials of a lens field

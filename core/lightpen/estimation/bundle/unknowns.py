@@ -40,7 +40,6 @@ class Components(NamedTuple):
 
     leds: Component  # of an LED coordinate, mm; 0 if the images agree with the file
     seat: tuple[Component, ...]  # of the seat by each kind of mode, mm
-    oval: Component  # of the two coefficients of an oval seat, see `oval_seat`, mm
     drift: Component  # of the cone over the whole range of each drift mode, mm
     jitter: RandomEffect  # seating from image to image
     fields: tuple[FieldComponent, ...] = ()  # fitted ones
@@ -48,7 +47,7 @@ class Components(NamedTuple):
     @property
     def sigmas(self) -> list[float]:
         """Standard deviations by which the unknowns are fitted, mm."""
-        found: list[Component | FieldComponent] = [self.leds, *self.seat, self.oval]
+        found: list[Component | FieldComponent] = [self.leds, *self.seat]
         found += [self.drift, *self.fields]
         jitter = self.jitter.covariance
         by_axis = [] if jitter is None else np.sqrt(np.diag(jitter)).tolist()
@@ -60,7 +59,7 @@ class Components(NamedTuple):
 
 
 NO_COMPONENTS = Components(
-    NONE, (NONE,) * len(MODE_COUNTS), NONE, NONE, RandomEffect(None, 0.0)
+    NONE, (NONE,) * len(MODE_COUNTS), NONE, RandomEffect(None, 0.0)
 )
 
 
@@ -100,7 +99,6 @@ class Unknowns:
     mixing: FloatArray
     # (N, m), weights of the moves of the cone in each image: seat and drift modes.
     forms: FloatArray
-    oval: FloatArray  # (21, 2), moves in the seat modes by an oval seat
     basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs without moves of the whole pen
     scaling: FloatArray  # (3 L,), move of the LEDs about the tip by a scale of 1
     priors: Priors
@@ -164,7 +162,7 @@ class Unknowns:
         mixing[at_leds, layout.leds] = basis
         forms = np.column_stack([given.lean, given.drift])
         return cls(
-            *(layout, start, mixing, forms, given.oval, basis, scaling, priors),
+            *(layout, start, mixing, forms, basis, scaling, priors),
             *(given, fields),
             np.broadcast_to(
                 1.0 if noise is None else noise,
@@ -254,11 +252,8 @@ class Unknowns:
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
         for place, found in zip(at.fields, components.fields, strict=True):
             prior[place, place] = known_by(found.covariance)
-        variances, oval = self.seat_variances(components), components.oval.sigma
-        prior[at.whole_seat, at.whole_seat] = (
-            inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)
-            if oval > 0
-            else np.diag(1 / variances)
+        prior[at.whole_seat, at.whole_seat] = np.diag(
+            1 / self.seat_variances(components)
         )
         of_leds = priors.led_covariance
         if of_leds is not None and components.leds is NONE:  # the images agree with it
@@ -301,7 +296,7 @@ class Unknowns:
         return information, right
 
     def seat_variances(self, components: Components) -> FloatArray:
-        """Return the variances of the moves in each seat mode, an oval apart, (21,)."""
+        """Return the variances of the moves in each seat mode, (21,)."""
         one_wave, *others = (each.sigma for each in components.seat)
         # One wave is hardly observable beside the tip, so it is taken to be as large
         # as the largest other mode.

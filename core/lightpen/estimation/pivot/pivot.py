@@ -27,6 +27,7 @@ N_SAMPLES = 300  # of four poses; 40 % outliers leave no clean one with 1e-18
 SAMPLE_SIZE = 4
 FEW = 12  # poses; four of them predict the others too poorly
 SHARE_OF_FEW = 0.75  # of so few poses: size of a sample
+MINORITY = 0.4  # of the poses, that agree at least
 OUTLIER = 1e-5  # probability that a correct pose is excluded
 LOOSE_THRESHOLD = 8.0  # where covariances are not given: real trackers have heavy tails
 MAX_PASSES = 20
@@ -61,7 +62,6 @@ def fit_pivot(
     covariances: FloatArray | None = None,
     *,
     robust: bool = True,
-    candidates: BoolArray | None = None,
 ) -> PivotFit:
     """Fit tip and pivot to poses by linear least squares.
 
@@ -80,8 +80,6 @@ def fit_pivot(
         Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
     robust : bool
         Leave out poses that do not agree with the pivot of the others.
-    candidates : (N,) array of bool, optional
-        Poses that may be used; all unless given.
 
     References
     ----------
@@ -91,16 +89,14 @@ def fit_pivot(
     """
     require_poses(rotations)
     equations = _Equations(rotations, translations, covariances)
-    if candidates is None:
-        candidates = np.ones(len(rotations), dtype=bool)
+    every = np.ones(len(rotations), dtype=bool)
     if not robust:
-        return equations.fit(candidates, candidates)
-    used = candidates & equations.inliers(
-        _best_sample(equations.of(candidates)), candidates
-    )
+        return equations.fit(every, every)
+    first = _best_sample(equations, MINORITY)
+    used = equations.inliers(first, every, MINORITY)
     for _ in range(MAX_PASSES):
         require_poses(rotations[used])
-        inliers = candidates & equations.inliers(equations.solve_weighted(used), used)
+        inliers = equations.inliers(equations.solve_weighted(used), used)
         if np.array_equal(inliers, used):
             break
         used = inliers
@@ -115,13 +111,6 @@ class _Equations:
     rotations: FloatArray
     translations: FloatArray
     covariances: FloatArray | None
-
-    def of(self, chosen: BoolArray) -> "_Equations":
-        """Return the equations of the chosen poses."""
-        covariances = None if self.covariances is None else self.covariances[chosen]
-        return _Equations(
-            self.rotations[chosen], self.translations[chosen], covariances
-        )
 
     def fit(self, used: BoolArray, inliers: BoolArray) -> PivotFit:
         """Solve over the used poses."""
@@ -152,15 +141,17 @@ class _Equations:
                 solution = self.solve(used[None], solution[:3])[0]
         return np.asarray(solution)
 
-    def inliers(self, solution: FloatArray, used: BoolArray) -> BoolArray:
+    def inliers(
+        self, solution: FloatArray, used: BoolArray, share: float = 0.5
+    ) -> BoolArray:
         """Return the mask of the inliers.
 
-        The median distance of the used poses sets the unit, so that a model that fits
-        worse than the covariances say (geometry errors, a worn cone) does not cost good
-        poses.
+        The distance within which a share of the used poses lies sets the unit, so that
+        a model that fits worse than the covariances say (geometry errors, a worn cone)
+        does not cost good poses.
         """
         distances = self.distances(solution)
-        unit = float(np.median(distances[used])) / median_distance()
+        unit = float(np.quantile(distances[used], share)) / chi_quantile(3, 1 - share)
         if self.covariances is None:
             return np.asarray(distances <= LOOSE_THRESHOLD * max(unit, TINY))
         return np.asarray(distances <= outlier_distance() * max(unit, 1.0))
@@ -283,7 +274,7 @@ def agreeing_solution(
     return solution
 
 
-def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
+def _best_sample(equations: _Equations, share: float) -> FloatArray:
     """Return the solution, (6,), mm, of the sample that fits a share of poses best."""
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip

@@ -150,11 +150,9 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
     n_leds = np.median(bundle.used.sum(axis=(1, 2)))  # fewer hardly tell it from LEDs
     if distance > by_form and n_leds >= SEAT_LEDS:
         warnings.append(message("warning.seat-jitter", distance=distance))
-    forms = (*found.seat, found.oval)
-    if any(form.is_significant for form in forms):
-        warnings.append(
-            message("warning.seat-form", distance=max(form.sigma for form in forms))
-        )
+    if any(form.is_significant for form in found.seat):
+        largest = max(form.sigma for form in found.seat)
+        warnings.append(message("warning.seat-form", distance=largest))
     if found.drift.is_significant:
         warnings.append(message("warning.drift", distance=bundle.drift))
     stated = calibration.priors.led_sigma

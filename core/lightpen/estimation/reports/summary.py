@@ -287,9 +287,7 @@ def pivot_record(
     ``places`` (N,) are the numbers of the poses in the file, ``n_lost`` how many others
     it has.
     """
-    fit, groups = calibration.fit, calibration.groups
-    uncertainty = calibration.expanded_uncertainty
-    group = np.ones(len(fit.used), dtype=int) if groups is None else groups.group
+    fit, uncertainty = calibration.fit, calibration.expanded_uncertainty
     record = {
         **record_heading(local_now()),
         "method": "least squares" if least_squares else "robust",
@@ -310,18 +308,9 @@ def pivot_record(
         "poses": {"total": len(fit.used), "used": int(fit.used.sum()), "lost": n_lost},
         "inputs": {"poses": file_entry(poses)},
         "frames": [
-            {
-                "pose": place,
-                "used": used,
-                "group": name or None,
-                "residual_mm": residual,
-            }
-            for place, used, name, residual in zip(
-                places.tolist(),
-                fit.used.tolist(),
-                group.tolist(),
-                fit.residuals.tolist(),
-                strict=True,
+            {"pose": place, "used": used, "residual_mm": residual}
+            for place, used, residual in zip(
+                places.tolist(), fit.used.tolist(), fit.residuals.tolist(), strict=True
             )
         ],
     }

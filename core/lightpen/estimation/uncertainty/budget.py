@@ -284,15 +284,14 @@ def _of_fields(
 
 def seat_covariance(bundle: Bundle) -> FloatArray:
     """Return the budgeted covariance of the seat's moves by modes, (21, 21), mm^2."""
-    seat, oval = bundle.budget_components.seat, bundle.budget_components.oval
+    seat = bundle.budget_components.seat
     likely = [form.expected_sigma for form in seat]
     form_error = bundle.unknowns.priors.form_error
     variances = [
         max(form.sigma, form_error, expected) ** 2
         for form, expected in zip(seat, [max(likely), *likely[1:]], strict=True)
     ]
-    by_oval = max(oval.sigma, oval.expected_sigma) * bundle.unknowns.oval
-    return _by_forms(variances) + by_oval @ by_oval.T
+    return _by_forms(variances)
 
 
 def drift_variance(bundle: Bundle) -> float:

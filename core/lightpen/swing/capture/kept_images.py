@@ -24,7 +24,6 @@ from lightpen.estimation.rigs.rig_poses import poses_in_rig
 from lightpen.estimation.uncertainty.prediction import (
     UNKNOWN_UNCERTAINTY,
     PredictedUncertainty,
-    UncertaintyPrediction,
     predict_uncertainty,
 )
 from lightpen.model.coverage import MIN_SPREAD, chi_quantile, posture_spread
@@ -195,7 +194,6 @@ class AcceptedImages:
     assumed: Assumptions = USUAL
     seat: Seat | None = None  # tip and cone by the best fit there is
     joint: JointFit | None = None  # as soon as the postures allow one
-    prediction: UncertaintyPrediction | None = None  # with the joint fit
     predicted: PredictedUncertainty = UNKNOWN_UNCERTAINTY
 
     def __len__(self) -> int:
@@ -297,9 +295,7 @@ def keep(
     if kept.joint is None:
         return _refit(rig, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, detection.rotation[None]])
-    longer = replace(
-        longer, seat=kept.seat, prediction=kept.prediction, predicted=kept.predicted
-    )
+    longer = replace(longer, seat=kept.seat, predicted=kept.predicted)
     return _refit(rig, pen, longer, starts, is_near=True)
 
 
@@ -330,7 +326,7 @@ def _leave_out(
         cofactors=kept.cofactors[stay],
         sigmas=kept.sigmas[stay],
         joint=None,
-        prediction=None,
+        predicted=UNKNOWN_UNCERTAINTY,
     )
     return _refit(rig, pen, rest, starts[stay], is_near=is_near) if len(rest) else rest
 
@@ -368,20 +364,9 @@ def _refit(
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     sigma = max(joint.sigma, NO_NOISE)
-    known = kept.prediction
-    if (
-        known is not None
-        and np.isfinite(before.uncertainty)
-        and len(kept) < known.n_images + RENEWED * len(kept)
-    ):
-        return replace(kept, seat=fitted, joint=joint, predicted=before)
-    prediction = predict_uncertainty(
-        rig, pen, kept.pixels, joint, sigma, kept.assumed, kept.prediction
-    )
-    predicted = prediction.predicted(joint, sigma, kept.assumed)
-    return replace(
-        kept, seat=fitted, joint=joint, prediction=prediction, predicted=predicted
-    )
+    if before.n_images < (1 - RENEWED) * len(kept):
+        before = predict_uncertainty(rig, pen, kept.pixels, joint, sigma, kept.assumed)
+    return replace(kept, seat=fitted, joint=joint, predicted=before)
 
 
 def distance_unit(kept: AcceptedImages) -> float:

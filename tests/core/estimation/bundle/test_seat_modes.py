@@ -3,10 +3,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.image_fields import (
-    FULL_LEAN,
     axes_of_cone,
     drift_modes,
-    oval_seat,
     tilt_modes,
 )
 from lightpen.model.rigid import rotation_from_vector, rotations_of
@@ -31,29 +29,11 @@ def test_a_drift_in_time_says_nothing_of_where_the_cone_is_on_average() -> None:
     assert np.ptp(in_time) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.3, 1.2])
-def test_an_oval_seat_moves_the_tip_to_the_axis_and_away_from_it(phase: float) -> None:
-    weight = np.sin(0.4) / (np.sin(0.4) + FULL_LEAN)
-    radius = 0.01 * weight * np.cos(2 * ANGLES - phase)
-    away = np.stack([np.cos(ANGLES), 0 * ANGLES, np.sin(ANGLES)], axis=1)
-
-    numbers = 0.01 * np.array([np.cos(phase), np.sin(phase)])
-    moves = (oval_seat(ROUND) @ numbers).reshape(-1, 3)
-
-    found = tilt_modes(ROUND) @ moves
-    np.testing.assert_allclose(found, radius[:, None] * away, atol=1e-12)
-
-
 def test_a_camera_that_looks_down_sees_the_same_seat() -> None:
     looking = rotation_from_vector(np.array([0.6, 0.0, 0.0]))
 
     np.testing.assert_allclose(
         tilt_modes(looking @ ROUND), tilt_modes(ROUND), atol=1e-12
-    )
-    np.testing.assert_allclose(
-        oval_seat(looking @ ROUND).reshape(-1, 3, 2),
-        looking @ oval_seat(ROUND).reshape(-1, 3, 2),
-        atol=1e-12,
     )
 
 
@@ -69,7 +49,6 @@ def test_a_pen_that_keeps_its_lean_has_no_forms() -> None:
     upright = np.tile(np.eye(3), (5, 1, 1))
 
     assert not tilt_modes(upright).any()
-    assert not oval_seat(upright).any()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from tests.simulated_centers import correlated_noise
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.pivot.pivot import contact_matrix
-from lightpen.estimation.pivot.pivot_groups import correlated_covariance
+from lightpen.estimation.pivot_calibration import correlated_covariance
 from lightpen_extensions.simulator.swings import swing_poses
 
 SWING = swing_poses(150, np.random.default_rng(0), "operator")
