@@ -197,7 +197,7 @@ def apply_theme(application: QApplication, colors: Colors) -> None:
     sheet = style_sheet(colors)
     if application.styleSheet() == sheet:
         return
-    application.setPalette(_palette(colors))
+    application.setPalette(palette_of(colors))
     application.setStyleSheet("")  # Qt replaces a sheet four times slower than none
     application.setStyleSheet(sheet)
     # On Windows a new sheet brings back the system's fonts of tables, lists and menus.
@@ -257,7 +257,8 @@ def set_styled(widget: QWidget, name: str, value: str) -> None:
         widget.style().polish(widget)
 
 
-def _palette(colors: Colors) -> QPalette:
+def palette_of(colors: Colors) -> QPalette:
+    """Return the palette of widgets in these colours."""
     role = QPalette.ColorRole
     palette = QPalette()
     for name, color in (

@@ -1,10 +1,9 @@
-"""The content of a calibration report, and what is drawn in it beside plots."""
+"""The content of a calibration report."""
 
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from PySide6.QtCore import QCoreApplication, QRectF
-from PySide6.QtGui import QPainter
+from PySide6.QtCore import QCoreApplication
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord, Pair
@@ -30,36 +29,19 @@ from lightpen_app.look.words import (
     decimals_for,
     number_text,
 )
-from lightpen_app.print_report.blocks import (
-    WIDTH,
-    Block,
-    PrintSize,
-    draw_text,
-    line_pen,
-    paragraph,
-    printed_text,
-    text_height,
-)
-from lightpen_app.print_report.charts import Chart
-from lightpen_app.print_report.figures import (
-    budget_chart,
-    certainty_chart,
-    coverage_chart,
-    histogram_chart,
-    led_chart,
-    misfit_chart,
-    posture_chart,
-    residual_chart,
-    running_chart,
-    tips_chart,
-)
+from lightpen_app.print_report.charts import charts_of
 from lightpen_app.print_report.template import (
+    ANCHOR,
     Content,
+    Part,
     cells,
     condition,
     environment_texts,
     fill,
     laboratory_texts,
+    markup,
+    paragraph,
+    printed_text,
     proof_texts,
     signatures,
     traced_rows,
@@ -80,13 +62,13 @@ GRADE_COLORS = {
 }
 
 
-def calibration_blocks(
+def calibration_parts(
     file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
     entered: EntryPlace | None,
     laboratory: Laboratory | None = None,
-) -> tuple[Block, ...]:
-    """Return the blocks of the whole report, from its title to its end mark."""
+) -> tuple[Part, ...]:
+    """Return the parts of the whole report, from its title to its end mark."""
     calibration = file.calibration
     texts = {
         **_item_texts(file),
@@ -115,7 +97,7 @@ def calibration_blocks(
         ],
         "signatures": [signatures(translate("paper", "Calibrated by"))],
     }
-    charts = _charts(calibration, reestimated)
+    charts = charts_of(calibration, reestimated)
     return fill("calibration", Content(texts, tables, charts=charts, drawn=drawn))
 
 
@@ -128,7 +110,7 @@ def status_words(file: CalibrationFile) -> tuple[str, ...]:
     return tuple(words[each] for each in file.library_status)
 
 
-def _verdict(file: CalibrationFile) -> Block:
+def _verdict(file: CalibrationFile) -> Part:
     word = grade_text(file.grade)
     lines = [worded(file.why)]
     if file.accepted is None:
@@ -140,22 +122,15 @@ def _verdict(file: CalibrationFile) -> Block:
     else:
         accepted = translate("paper", "The tip was accepted. Reason: {0}")
         lines.append(accepted.format(file.reason))
-    text, left, pad = "\n".join(lines), 900.0, 60.0
-    height = max(
-        text_height(text, PrintSize.BODY, WIDTH - left - pad),
-        text_height(word, PrintSize.TITLE, left),
-    )
     color = GRADE_COLORS[file.grade]
-
-    def paint(painter: QPainter) -> None:
-        painter.setPen(line_pen(color, 15))
-        painter.drawRect(QRectF(0, 0, WIDTH, height + 2 * pad))
-        area = QRectF(pad, pad, left, height)
-        draw_text(painter, area, word, PrintSize.TITLE, color, bold=True)
-        area = QRectF(left, pad + 10, WIDTH - left - pad, height)
-        draw_text(painter, area, text, PrintSize.BODY)
-
-    return Block(paint, height + 2 * pad, space=110)
+    frame = f"border: 15px solid {color}"
+    return Part(
+        f'<table width="100%" cellspacing="0"><tr>'
+        f'<td class="verdict" style="{frame}; border-right: none" width="18%">'
+        f'<h1 style="color: {color}">{ANCHOR}{markup(word)}</h1></td>'
+        f'<td class="verdict" style="{frame}; border-left: none" valign="middle">'
+        f"{markup(chr(10).join(lines))}</td></tr></table>"
+    )
 
 
 def _item_texts(file: CalibrationFile) -> dict[str, str | None]:
@@ -322,30 +297,6 @@ def _image_texts(
         "n_more": f"{n_left_out - MOST_IMAGES}" if n_left_out > MOST_IMAGES else None,
         # Of a rig the record itself has the first camera's.
         "of_camera": f" ({cameras[0].file})" if cameras else "",
-    }
-
-
-def _charts(
-    calibration: CalibrationRecord, reestimated: ReestimatedPoses | None
-) -> dict[str, Chart | None]:
-    charts: dict[str, Chart | None] = {
-        "budget_plot": budget_chart(calibration),
-        "misfits": misfit_chart(calibration),
-        "tips": tips_chart(calibration),
-        "led_plot": led_chart(calibration),
-    }
-    of_poses = "coverage_alone running certainty postures coverage residuals histogram"
-    charts |= dict.fromkeys(of_poses.split())
-    if reestimated is None:
-        return charts | {"coverage_alone": coverage_chart(calibration)}
-    limit = calibration.verdict.limits.max_uncertainty_mm
-    return charts | {
-        "running": running_chart(reestimated, np.array(calibration.tip_pen_mm)),
-        "certainty": certainty_chart(reestimated, limit),
-        "postures": posture_chart(reestimated),
-        "coverage": coverage_chart(calibration),
-        "residuals": residual_chart(reestimated),
-        "histogram": histogram_chart(reestimated),
     }
 
 

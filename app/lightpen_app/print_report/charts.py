@@ -1,311 +1,201 @@
-"""Printed plots: axes with numbers, dots, lines, bars and arrows.
-
-What shows series apart is their form besides their colour, as paper is often grey.
-Nothing is see-through: PDF/A-1 has no transparency.
-"""
-
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum, auto
+"""The plots of a calibration, drawn by the plots of the window."""
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+from PySide6.QtCore import QCoreApplication
 
 from lightpen.arrays import FloatArray
-from lightpen_app.look.theme import LIGHT
-from lightpen_app.look.words import number_text
-from lightpen_app.print_report.blocks import (
-    CENTER,
-    HAIRLINE,
-    RIGHT,
-    WIDTH,
-    Block,
-    PrintSize,
-    draw_text,
-    line_pen,
-    text_width,
+from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen.record.recomputing import ReestimatedPoses
+from lightpen_app.look.figures import budget_figure
+from lightpen_app.look.words import AXES, MICROMETRES
+from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.plots import Curve, TracePlot
+from lightpen_app.widgets.result_plots import (
+    FARTHEST,
+    ArrowPlot,
+    BarPlot,
+    BudgetPlot,
+    Histogram,
+    LinePlot,
+    PosturePlot,
 )
 
-SERIES = (LIGHT.accent, LIGHT.pointer, LIGHT.good)
-DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine)
-DOT = 16.0  # across
-TITLE_ROOM = 1.9 * PrintSize.BODY
-LABEL_ROOM = 3.4 * PrintSize.SMALL  # below the axes: numbers and labels
-N_TICKS = 5
-GAP = 160.0  # between plots side by side
-LETTERS = PrintSize.SMALL
+translate = QCoreApplication.translate
+
+HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
+STEADY = 8.0  # times the last U, beyond which a tip by few images is left out
 
 
-@dataclass(frozen=True)
-class PlotRange:
-    """Range of a plot."""
+def charts_of(
+    calibration: CalibrationRecord, reestimated: ReestimatedPoses | None
+) -> dict[str, Figure]:
+    """Return the plots by their names in the template.
 
-    x_low: float
-    x_high: float
-    y_low: float
-    y_high: float
-
-
-@dataclass(frozen=True)
-class Plane:
-    """Scale of numbers on paper."""
-
-    area: QRectF
-    shown: PlotRange
-
-    def points(self, x: FloatArray, y: FloatArray) -> list[QPointF]:
-        """Return the places of x (N,) and y (N,), dots, limited to the range."""
-        shown, area = self.shown, self.area
-        right = (np.clip(x, shown.x_low, shown.x_high) - shown.x_low) / (
-            shown.x_high - shown.x_low
-        )
-        up = (np.clip(y, shown.y_low, shown.y_high) - shown.y_low) / (
-            shown.y_high - shown.y_low
-        )
-        places = zip(
-            (area.left() + right * area.width()).tolist(),
-            (area.bottom() - up * area.height()).tolist(),
-            strict=True,
-        )
-        return [QPointF(*place) for place in places]
-
-    def point(self, x: float, y: float) -> QPointF:
-        """Return the position of one point, dots."""
-        return self.points(np.array([x]), np.array([y]))[0]
+    Some need the reestimated images.
+    """
+    plots = {
+        "budget_plot": _budget(calibration),
+        "misfits": _misfits(calibration),
+        "tips": _tips(calibration),
+        "led_plot": _leds(calibration),
+    }
+    coverage = _coverage(calibration)
+    if reestimated is None:
+        return plots | {"coverage_alone": coverage}
+    limit = calibration.verdict.limits.max_uncertainty_mm
+    return plots | {
+        "running": _running(reestimated, np.array(calibration.tip_pen_mm)),
+        "certainty": _certainty(reestimated, limit),
+        "postures": _postures(reestimated),
+        "coverage": coverage,
+        "residuals": _residuals(reestimated),
+        "histogram": _histogram(reestimated),
+    }
 
 
-class Mark(Enum):
-    """Style of the series of a plot."""
-
-    LINE = auto()
-    DOT = auto()
-    BAR = auto()
-
-
-@dataclass(frozen=True)
-class Chart:
-    """A plot: its title, its names of series, and what draws it into an area."""
-
-    title: str
-    paint: Callable[[QPainter, QRectF], None]
-    # Names of the series in their order, shown beside the title.
-    names: tuple[str, ...] = ()
-    mark: Mark = Mark.LINE  # symbol before the names
-
-
-@dataclass(frozen=True)
-class AxisWords:
-    """Labels of the axes."""
-
-    x: str = ""
-    # Labels below the axis at 0, 1, 2 ... instead of numbers.
-    labels: tuple[str, ...] = ()
-
-
-def row_of_charts(charts: Sequence[Chart], height: float) -> Block:
-    """Return plots side by side."""
-    width = (WIDTH - (len(charts) - 1) * GAP) / len(charts)
-
-    def paint(painter: QPainter) -> None:
-        for i, chart in enumerate(charts):
-            left = i * (width + GAP)
-            names_left = _paint_names(painter, chart, left + width)
-            size = fitting_size(chart.title, names_left - left)
-            title = QRectF(left, 0, width, PrintSize.BODY)
-            draw_text(painter, title, chart.title, size, bold=True)
-            room = height - TITLE_ROOM
-            chart.paint(painter, QRectF(left, TITLE_ROOM, width, room))
-
-    return Block(paint, height, space=90)
-
-
-def fitting_size(title: str, room: float) -> float:
-    """Return the size of letters in which a title fits into a room, dots."""
-    needed = text_width(title, PrintSize.BODY, bold=True)
-    return PrintSize.BODY * min(1.0, room / needed)
-
-
-def padded_range(x: FloatArray, y: FloatArray, *, from_zero: bool = False) -> PlotRange:
-    """Return the range of all finite values, with a margin."""
-    x_low, x_high = _reach(x)
-    y_low, y_high = _reach(y)
-    if from_zero:
-        y_low = min(y_low, 0.0)
-    room = 0.06 * (y_high - y_low)
-    is_at_zero = from_zero and y_low == 0
-    y_low = 0.0 if is_at_zero else y_low - room
-    return PlotRange(x_low, x_high, y_low, y_high + room)
-
-
-def paint_axes(
-    painter: QPainter, area: QRectF, shown: PlotRange, words: AxisWords
-) -> Plane:
-    """Draw axes with numbers and lines, and return where to draw."""
-    heights = _ticks(shown.y_low, shown.y_high)
-    texts = _tick_texts(heights)
-    room = max(text_width(text, LETTERS) for text in texts) + 30
-    inner = QRectF(
-        area.left() + room, area.top(), area.width() - room, area.height() - LABEL_ROOM
+def _misfits(calibration: CalibrationRecord) -> Figure:
+    """Return the misfit of each image; one that takes no part is apart."""
+    misfits = np.array([f.rms_px for f in calibration.frames], dtype=np.float64)
+    used = np.array([f.used for f in calibration.frames], dtype=bool)
+    top = HEADROOM * float(np.nanmax(misfits[used], initial=1e-6))
+    heights = np.where(np.isfinite(misfits), np.minimum(misfits, top), top)
+    names = translate("paper", "included"), translate("paper", "excluded")
+    plot = LinePlot(
+        Axes(translate("paper", "RMS residual per image / px"), _image_number()),
+        [Curve(name, name) for name in names],
+        is_joined=False,
     )
-    plane = Plane(inner, shown)
-    for height, text in zip(heights, texts, strict=True):
-        y = plane.point(shown.x_low, height).y()
-        painter.setPen(line_pen(LIGHT.line))
-        painter.drawLine(QPointF(inner.left(), y), QPointF(inner.right(), y))
-        place = QRectF(area.left(), y - 0.68 * LETTERS, room - 20, LETTERS)
-        draw_text(painter, place, text, LETTERS, LIGHT.muted, RIGHT)
-    _paint_below(painter, plane, words)
-    painter.setPen(line_pen(LIGHT.edge))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.drawRect(inner)
-    return plane
+    parts = (np.where(part, heights, np.nan) for part in (used, ~used))
+    plot.set_data(np.arange(1.0, len(misfits) + 1), *parts)
+    return plot
 
 
-def paint_dots(
-    painter: QPainter, plane: Plane, x: FloatArray, y: FloatArray, series: int = 0
-) -> None:
-    """Draw dots, squares or triangles at x (N,), y (N,) that are numbers."""
-    known = np.isfinite(y)
-    for point in plane.points(x[known], y[known]):
-        _paint_dot(painter, point, series)
-
-
-def paint_crosses(
-    painter: QPainter, plane: Plane, x: FloatArray, y: FloatArray
-) -> None:
-    """Draw crosses at x (N,), y (N,)."""
-    painter.setPen(line_pen(LIGHT.bad, 7))
-    arm, other = QPointF(DOT, DOT), QPointF(DOT, -DOT)
-    for point in plane.points(x, y):
-        painter.drawLine(point - arm, point + arm)
-        painter.drawLine(point - other, point + other)
-
-
-def paint_line(
-    painter: QPainter,
-    plane: Plane,
-    x: FloatArray,
-    y: FloatArray,
-    series: int = 0,
-    color: str = "",
-) -> None:
-    """Draw a line through x (N,), y (N,), full, dashed or dotted."""
-    painter.save()
-    painter.setClipRect(plane.area)
-    painter.setPen(_series_pen(series, color))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.drawPolyline(QPolygonF(plane.points(x, y)))
-    painter.restore()
-
-
-def paint_bars(painter: QPainter, plane: Plane, values: Sequence[FloatArray]) -> None:
-    """Draw groups of bars at 0, 1, 2 and so on, one a series; NaN leaves a gap."""
-    width = 0.8 / len(values)
-    for series, heights in enumerate(values):
-        painter.setPen(line_pen(SERIES[series], HAIRLINE))
-        painter.setBrush(_filling(series))
-        for place, height in enumerate(heights.tolist()):
-            if not math.isfinite(height):
-                continue
-            left = place - 0.4 + series * width
-            corners = plane.points(
-                np.array([left, left + 0.92 * width]), np.array([0.0, height])
-            )
-            painter.drawRect(QRectF(*corners).normalized())
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-
-
-def _series_pen(series: int, color: str = "") -> QPen:
-    pen = line_pen(color or SERIES[series], 9)
-    pen.setStyle(DASHES[series])
-    return pen
-
-
-def _paint_dot(painter: QPainter, point: QPointF, series: int) -> None:
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(SERIES[series]))
-    half = DOT / 2
-    if series == 0:
-        painter.drawEllipse(point, half, half)
-    elif series == 1:
-        painter.drawRect(QRectF(point.x() - half, point.y() - half, DOT, DOT))
-    else:
-        up, side = QPointF(0, -1.2 * half), QPointF(1.2 * half, 0.9 * half)
-        other = QPointF(-side.x(), side.y())
-        painter.drawPolygon(QPolygonF([point + up, point + side, point + other]))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-
-
-def _filling(series: int) -> QColor:
-    """Return a fill colour that differs in brightness from the others."""
-    return QColor((LIGHT.accent, LIGHT.partial, LIGHT.panel)[series])
-
-
-def _paint_names(painter: QPainter, chart: Chart, right: float) -> float:
-    """Draw the names of series with their marks, from the right; return their left."""
-    middle = 0.72 * LETTERS
-    for series, name in reversed(list(enumerate(chart.names))):
-        width = text_width(name, LETTERS)
-        right -= width
-        area = QRectF(right, 0, width + 10, LETTERS)
-        draw_text(painter, area, name, LETTERS)
-        if chart.mark is Mark.LINE:
-            painter.setPen(_series_pen(series))
-            painter.drawLine(QPointF(right - 150, middle), QPointF(right - 20, middle))
-        elif chart.mark is Mark.DOT:
-            _paint_dot(painter, QPointF(right - 35, middle), series)
-        else:
-            painter.setPen(line_pen(SERIES[series], HAIRLINE))
-            painter.setBrush(_filling(series))
-            painter.drawRect(QRectF(right - 75, middle - 25, 50, 50))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-        right -= 190
-    return right
-
-
-def _paint_below(painter: QPainter, plane: Plane, words: AxisWords) -> None:
-    shown, area = plane.shown, plane.area
-    if words.labels:
-        places, texts = list(map(float, range(len(words.labels)))), list(words.labels)
-    else:
-        places = _ticks(shown.x_low, shown.x_high)
-        texts = _tick_texts(places)
-    width = area.width() / max(len(places), 1)
-    for place, text in zip(places, texts, strict=True):
-        x = plane.point(place, shown.y_low).x()
-        painter.setPen(line_pen(LIGHT.edge))
-        painter.drawLine(QPointF(x, area.bottom()), QPointF(x, area.bottom() + 15))
-        label = QRectF(x - width / 2, area.bottom() + 18, width, LETTERS)
-        draw_text(painter, label, text, LETTERS, LIGHT.muted, CENTER)
-    place_of_words = QRectF(
-        area.left(), area.bottom() + 1.75 * LETTERS, area.width(), LETTERS
+def _leds(calibration: CalibrationRecord) -> Figure:
+    """Return the residuals of each LED."""
+    rms = np.array([led.rms_px for led in calibration.leds], dtype=np.float64)
+    means = np.array([led.mean_px for led in calibration.leds], dtype=np.float64)
+    names = (
+        translate("paper", "rms"),
+        translate("paper", "mean x"),
+        translate("paper", "mean y"),
     )
-    draw_text(painter, place_of_words, words.x, LETTERS, LIGHT.muted, CENTER)
+    axes = Axes(translate("paper", "Residuals by LED / px"), translate("paper", "LED"))
+    plot = BarPlot(axes, [Curve(name, name) for name in names], "led")
+    plot.set_data([str(led.led) for led in calibration.leds], rms, *means.T)
+    return plot
 
 
-def _reach(values: FloatArray) -> tuple[float, float]:
-    """Return minimum and maximum of the finite values, never equal."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return 0.0, 1.0
-    low, high = float(known.min()), float(known.max())
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
+def _budget(calibration: CalibrationRecord) -> Figure:
+    """Return the parts of U along its weakest direction."""
+    plot = BudgetPlot(
+        Axes(translate("paper", "U (k = 2) by source, weakest direction / mm"))
+    )
+    plot.set_value(
+        budget_figure(
+            (
+                (share.name, share.weakest_expanded_uncertainty_mm, share.assumed)
+                for share in calibration.uncertainty.shares
+            ),
+            calibration.weakest_direction.expanded_uncertainty_mm,
+            calibration.verdict.limits.max_uncertainty_mm,
+        )
+    )
+    return plot
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """Return round numbers in a range."""
-    rough = (high - low) / N_TICKS
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= 0.999 * rough)
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    return [each * step for each in range(first, last + 1)]
+def _tips(calibration: CalibrationRecord) -> Figure:
+    """Return the tip by each image minus the cone, camera frame."""
+    tips = np.array([f.tip_cam_mm for f in calibration.frames], dtype=np.float64)
+    used = np.array([f.used for f in calibration.frames], dtype=bool)
+    away = MICROMETRES * (tips[used] - np.array(calibration.cone_cam_mm))
+    title = translate("paper", "Tip per image relative to the cone / µm")
+    curves = [Curve(name, name) for name in "uvw"]
+    plot = LinePlot(Axes(title, _image_number()), curves, is_joined=False)
+    numbers = 1.0 + np.flatnonzero(used).astype(np.float64)
+    plot.set_data(numbers, *away.T)
+    return plot
 
 
-def _tick_texts(ticks: Sequence[float]) -> list[str]:
-    """Return numbers with enough decimals to differ."""
-    step = ticks[1] - ticks[0] if len(ticks) > 1 else abs(ticks[0]) or 1.0
-    decimals = next(d for d in range(12) if round(step, d) == round(step, 12))
-    return [number_text(tick, decimals) for tick in ticks]
+def _running(reestimated: ReestimatedPoses, tip: FloatArray) -> Figure:
+    """Return the convergence of the tip (3,), mm, with the images."""
+    title = translate("paper", "Tip from the first n images minus result / µm")
+    return _trace(title, reestimated, reestimated.tips - tip)
+
+
+def _certainty(reestimated: ReestimatedPoses, limit: float) -> Figure:
+    """Return U (k = 2) over the number of images, with its limit, mm."""
+    title = translate("paper", "U (k = 2) from the first n images / µm")
+    return _trace(title, reestimated, reestimated.uncertainties, limit)
+
+
+def _trace(
+    title: str,
+    reestimated: ReestimatedPoses,
+    values: FloatArray,
+    limit: float | None = None,
+) -> TracePlot:
+    """Return values (M, 3), mm, of running tips that are certain enough to draw.
+
+    With a limit, mm, it is drawn, and zero is shown.
+    """
+    worst = reestimated.uncertainties.max(axis=1)
+    steady = worst <= STEADY * worst[-1]
+    curves = [Curve(axis, axis) for axis in AXES]
+    axes = Axes(title, _image_number())
+    plot = TracePlot(axes, curves, y_zero=limit is not None)
+    if limit is not None:
+        plot.set_limit(MICROMETRES * limit)
+    numbers = reestimated.numbers[steady].astype(np.float64)
+    plot.set_data(numbers, *(MICROMETRES * values[steady]).T)
+    return plot
+
+
+def _residuals(reestimated: ReestimatedPoses) -> Figure:
+    """Return the residuals as enlarged arrows at their image positions."""
+    plot = ArrowPlot(Axes(""))
+    plot.set_data(None, reestimated.points, reestimated.residuals)
+    title = translate("paper", "Residuals over the image \xd7 {0}")
+    plot.set_axes(Axes(title.format(f"{plot.scale():g}"), "x / px", "y / px"))
+    return plot
+
+
+def _histogram(reestimated: ReestimatedPoses) -> Figure:
+    """Return the histogram of the residuals with the normal curve."""
+    title = translate("paper", "Histogram of residuals with normal fit")
+    plot = Histogram(Axes(title, translate("paper", "residual / px")), "residual_px")
+    plot.set_data(reestimated.residuals.ravel())
+    return plot
+
+
+def _postures(reestimated: ReestimatedPoses) -> Figure:
+    """Return the plot of the pen tilts from above, with the camera below."""
+    plot = PosturePlot(_of_dial(translate("paper", "Postures: tilt / \xb0")))
+    plot.set_data(reestimated.tilts, reestimated.directions)
+    return plot
+
+
+def _coverage(calibration: CalibrationRecord) -> Figure:
+    """Return the number of images in each field of the dial."""
+    coverage = calibration.coverage
+    inner, outer = np.degrees(TILT_RINGS)
+    places, counts = [(0.0, 0.0)], [coverage.upright]
+    for radius, of_ring in (
+        ((inner + outer) / 2, coverage.leaning),
+        ((outer + FARTHEST) / 2, coverage.leaning_far),
+    ):
+        angles = 2 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
+        places += zip(radius * np.cos(angles), radius * np.sin(angles), strict=True)
+        counts += of_ring
+    plot = PosturePlot(_of_dial(translate("paper", "Images per field")))
+    plot.set_data(np.zeros(0), np.zeros(0))
+    plot.set_labels(np.array(places), list(map(str, counts)))
+    return plot
+
+
+def _of_dial(title: str) -> Axes:
+    return Axes(title, translate("paper", "towards the camera"))
+
+
+def _image_number() -> str:
+    return translate("paper", "image")

@@ -1,16 +1,41 @@
-"""Page layout of a report: position of blocks, header and footer."""
+"""The pages of a report: a document with a header and a footer on each page.
 
-from collections.abc import Callable, Sequence
+Preview, PDF and printer show the same document. The PDF is PDF/A-1b: fonts are in it,
+colours are defined, and nothing outside of it is needed to show it in decades.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
-from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QMarginsF, QRectF
+from PySide6.QtCore import (
+    QBuffer,
+    QCoreApplication,
+    QIODevice,
+    QMarginsF,
+    QRect,
+    QRectF,
+    QSizeF,
+    Qt,
+)
 from PySide6.QtGui import (
+    QAbstractTextDocumentLayout,
+    QColor,
+    QFontMetricsF,
     QPagedPaintDevice,
     QPageLayout,
     QPageSize,
     QPainter,
     QPdfWriter,
+    QPen,
+    QPyTextObject,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextFormat,
 )
+from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.names import Laboratory, Origin
@@ -20,36 +45,49 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.recomputing import ReestimatedPoses
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
-from lightpen_app.print_report.blocks import (
-    DOTS_AN_INCH,
+from lightpen_app.look.words import BREAK
+from lightpen_app.print_report.calibration import calibration_parts, status_words
+from lightpen_app.print_report.template import (
+    ANCHOR,
     MM,
-    RIGHT,
     WIDTH,
-    Block,
+    Drawn,
+    Part,
     PrintSize,
-    draw_text,
-    line_pen,
-    text_width,
+    print_font,
+    printed_text,
+    record_number,
 )
-from lightpen_app.print_report.calibration import calibration_blocks, status_words
-from lightpen_app.print_report.template import record_number
 
 translate = QCoreApplication.translate
 
+DOTS_AN_INCH = 720
 PAGE_WIDTH, PAGE_HEIGHT = 210 * MM, 297 * MM  # A4
 LEFT_MARGIN = (PAGE_WIDTH - WIDTH) / 2
 TOP, BOTTOM = 30 * MM, 22 * MM  # from the edges of the paper to what is on a page
 ROOM = PAGE_HEIGHT - TOP - BOTTOM
 HEADER, FOOTER = 11 * MM, 18 * MM  # from the upper and the lower edge
 BADGE_PADDING = 40.0
-
-
-@dataclass(frozen=True)
-class PlacedBlock:
-    """A block and its position below the top of the page, dots."""
-
-    block: Block
-    top: float
+KEEP, WITH = "keep", "with"  # first of what stands on one page, and the others
+STYLE = f"""
+    p, td {{ color: {LIGHT.text}; font-size: {PrintSize.BODY:d}px; margin: 45px 0 0 0 }}
+    h1 {{ color: {LIGHT.text}; font-size: {PrintSize.TITLE:d}px; margin: 0 }}
+    h2 {{ color: {LIGHT.text}; font-size: {PrintSize.HEADING:d}px;
+        margin: 190px 0 60px 0 }}
+    h3 {{ color: {LIGHT.text}; font-size: {PrintSize.BODY:d}px; margin: 110px 0 0 0 }}
+    p.lead {{ color: {LIGHT.muted}; font-size: {PrintSize.HEADING:d}px }}
+    p.strong {{ font-weight: bold }}
+    p.small, td.small {{ font-size: {PrintSize.SMALL:d}px }}
+    p.remark {{ color: {LIGHT.muted}; font-size: {PrintSize.SMALL:d}px }}
+    table {{ margin: 45px 0 45px 0 }}
+    td {{ padding: 10px 60px 10px 0 }}
+    td.name, td.head {{ color: {LIGHT.muted} }}
+    td.head, td.row, td.strong {{ border-bottom: 5px solid {LIGHT.line} }}
+    td.strong {{ font-weight: bold }}
+    td.signed {{ padding: 200px 0 400px 0; border-bottom: 5px solid {LIGHT.text} }}
+    td.signature {{ color: {LIGHT.muted}; font-size: {PrintSize.SMALL:d}px }}
+    td.verdict {{ padding: 60px }}
+"""
 
 
 @dataclass(frozen=True)
@@ -65,76 +103,160 @@ class Margins:
 
 @dataclass(frozen=True)
 class PrintReport:
-    """All pages, ready to be drawn."""
+    """All that is on the pages."""
 
     author: str  # author in the properties of the file; may be empty
     margins: Margins
-    pages: tuple[tuple[PlacedBlock, ...], ...]
-
-    @property
-    def n_pages(self) -> int:
-        """Number of pages."""
-        return len(self.pages)
+    parts: tuple[Part, ...]
 
 
-def lay_out(
-    blocks: Sequence[Block], room: float = ROOM
-) -> tuple[tuple[PlacedBlock, ...], ...]:
-    """Return pieces on pages, in their order.
+class _Plots(QPyTextObject):
+    """Draws the plots of a document in the places of images."""
 
-    Blocks that belong together begin on a new page if they do not fit as a whole. A
-    piece higher than a page has one to itself.
+    def __init__(self, document: QTextDocument, plots: Mapping[str, Drawn]) -> None:
+        super().__init__(document)
+        self._plots = plots
+        image = QTextFormat.ObjectTypes.ImageObject
+        document.documentLayout().registerHandler(image, self)
+
+    @override
+    def intrinsicSize(
+        self, doc: QTextDocument, posInDocument: int, format: QTextFormat
+    ) -> QSizeF:
+        image = format.toImageFormat()
+        return QSizeF(image.width(), image.height())
+
+    @override
+    def drawObject(
+        self,
+        painter: QPainter,
+        rect: QRectF | QRect,
+        doc: QTextDocument,
+        posInDocument: int,
+        format: QTextFormat,
+    ) -> None:
+        painter.save()
+        painter.translate(QRectF(rect).topLeft())
+        self._plots[format.toImageFormat().name()].paint(painter, rect.width())
+        painter.restore()
+
+
+def lay_out(parts: Sequence[Part]) -> QTextDocument:
+    """Return parts as a document with pages of `WIDTH` and `ROOM`, in dots.
+
+    Parts that belong together begin on a new page if they do not fit as a whole.
     """
-    pages: list[list[PlacedBlock]] = [[]]
-    top = 0.0
-    for group in _groups(blocks):
-        height = sum(each.height + each.space for each in group)
-        if pages[-1] and top + height > room:
-            pages.append([])
-            top = 0.0
-            if group[0].head is not None:
-                group = (group[0].head, *group)
-        for block in group:
-            top += block.space if pages[-1] else 0.0
-            pages[-1].append(PlacedBlock(block, top))
-            top += block.height
-    return tuple(map(tuple, pages))
+    document = QTextDocument()
+    document.setUseDesignMetrics(True)
+    document.setDocumentMargin(0)
+    document.setDefaultFont(print_font(PrintSize.BODY))
+    document.setDefaultStyleSheet(STYLE)
+    _Plots(document, {n: plot for part in parts for n, plot in part.plots.items()})
+    document.setHtml("".join(_anchored(parts)))
+    document.setPageSize(QSizeF(WIDTH, ROOM))
+    for first, last in list(_kept(document)):
+        top, bottom = _place(document, first).top(), _place(document, last).bottom()
+        if top // ROOM != (bottom - 1) // ROOM and bottom - top <= ROOM:
+            begins = QTextBlockFormat()
+            begins.setPageBreakPolicy(QTextFormat.PageBreakFlag.PageBreak_AlwaysBefore)
+            QTextCursor(first).mergeBlockFormat(begins)
+            document.setPageSize(QSizeF())  # else parts of the old pages remain
+            document.setPageSize(QSizeF(WIDTH, ROOM))
+    return document
 
 
-def paint_page(report: PrintReport, number: int, painter: QPainter) -> None:
-    """Draw a page in dots, from the corner of the paper."""
+def paint_page(
+    report: PrintReport, document: QTextDocument, number: int, painter: QPainter
+) -> None:
+    """Draw a page of the laid out report, in dots from the corner of the paper."""
     painter.save()
     painter.translate(LEFT_MARGIN, 0)
     _paint_header(report.margins, painter)
-    _paint_footer(report, number, painter)
-    for placed in report.pages[number - 1]:
-        painter.save()
-        painter.translate(0, TOP + placed.top)
-        placed.block.paint(painter)
-        painter.restore()
+    _paint_footer(report.margins, number, document.pageCount(), painter)
+    shown = QRectF(0, (number - 1) * ROOM, WIDTH, ROOM)
+    painter.translate(0, TOP - shown.top())
+    for block in _blocks(document):
+        place = _place(document, block)
+        is_shown = shown.top() < place.bottom() <= shown.bottom()
+        if block.blockFormat().headingLevel() == 2 and is_shown:
+            painter.setPen(_line_pen(LIGHT.accent, 10))
+            line = round(place.bottom() + 10)
+            painter.drawLine(0, line, round(WIDTH), line)
+    context = QAbstractTextDocumentLayout.PaintContext()
+    context.clip = shown
+    painter.setClipRect(shown)
+    document.documentLayout().draw(painter, context)
     painter.restore()
 
 
-def _groups(blocks: Sequence[Block]) -> list[tuple[Block, ...]]:
-    groups: list[tuple[Block, ...]] = []
-    group: list[Block] = []
-    for block in blocks:
-        group.append(block)
-        if not block.keeps:
-            groups.append(tuple(group))
-            group = []
-    return [*groups, tuple(group)] if group else groups
+def _anchored(parts: Iterable[Part]) -> Iterator[str]:
+    """Yield the HTML of the parts, with anchors where they are kept together."""
+    for before, part in pairwise((Part(""), *parts)):
+        name = WITH if before.keeps else KEEP if part.keeps else ""
+        # An anchor parts its letter from a word, so it has one that is not seen.
+        anchor = f'<a name="{name}"></a>{BREAK}' if name else ""
+        yield part.html.replace(ANCHOR, anchor)
+
+
+def _kept(document: QTextDocument) -> Iterator[tuple[QTextBlock, QTextBlock]]:
+    """Yield the first and the last block of what is kept together."""
+    first = last = None
+    for block in _blocks(document):
+        names = {n for each in block.textFormats() for n in each.format.anchorNames()}
+        if KEEP in names:
+            if first is not None and last is not None:
+                yield first, last
+            first, last = block, None
+        elif WITH in names:
+            last = block
+    if first is not None and last is not None:
+        yield first, last
+
+
+def _blocks(document: QTextDocument) -> Iterator[QTextBlock]:
+    block = document.begin()
+    while block.isValid():
+        yield block
+        block = block.next()
+
+
+def _place(document: QTextDocument, block: QTextBlock) -> QRectF:
+    return document.documentLayout().blockBoundingRect(block)
+
+
+def _write(
+    painter: QPainter,
+    area: QRectF,
+    text: str,
+    size: float,
+    color: str = LIGHT.text,
+    align: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
+    *,
+    bold: bool = False,
+) -> None:
+    """Draw words in one line at the top of an area."""
+    painter.setFont(print_font(size, bold=bold))
+    painter.setPen(QColor(color))
+    flags = align | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextDontClip
+    painter.drawText(area, flags, printed_text(text))
+
+
+def _line_pen(color: str, width: float = 5.0) -> QPen:
+    pen = QPen(QColor(color), width)
+    pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+    return pen
 
 
 def _paint_header(margins: Margins, painter: QPainter) -> None:
     title = QRectF(0, HEADER, WIDTH / 2, PrintSize.BODY)
-    draw_text(painter, title, margins.title, PrintSize.BODY, bold=True)
+    _write(painter, title, margins.title, PrintSize.BODY, bold=True)
     below = title.translated(0, 1.7 * PrintSize.BODY)
-    draw_text(painter, below, margins.subject, PrintSize.BODY, LIGHT.muted)
+    _write(painter, below, margins.subject, PrintSize.BODY, LIGHT.muted)
     right = QRectF(WIDTH / 2, HEADER, WIDTH / 2, PrintSize.BODY)
-    draw_text(painter, right, margins.number, PrintSize.BODY, LIGHT.muted, RIGHT)
+    at_right = Qt.AlignmentFlag.AlignRight
+    _write(painter, right, margins.number, PrintSize.BODY, LIGHT.muted, at_right)
     _paint_badges(margins.badges, painter)
-    painter.setPen(line_pen(LIGHT.edge))
+    painter.setPen(_line_pen(LIGHT.edge))
     line = round(HEADER + 3.6 * PrintSize.BODY)
     painter.drawLine(0, line, round(WIDTH), line)
 
@@ -142,31 +264,28 @@ def _paint_header(margins: Margins, painter: QPainter) -> None:
 def _paint_badges(badges: Sequence[str], painter: QPainter) -> None:
     """Draw framed badges from the right; their words do not depend on colour."""
     right, top = WIDTH, HEADER + 1.6 * PrintSize.BODY
+    metrics = QFontMetricsF(print_font(PrintSize.BODY, bold=True))
     for text in reversed(badges):
-        width = text_width(text, PrintSize.BODY, bold=True) + 2 * BADGE_PADDING
+        width = metrics.horizontalAdvance(text) + 2 * BADGE_PADDING
         frame = QRectF(right - width, top, width, 1.55 * PrintSize.BODY)
-        painter.setPen(line_pen(LIGHT.bad, 10))
+        painter.setPen(_line_pen(LIGHT.bad, 10))
         painter.drawRect(frame)
         inner = frame.adjusted(BADGE_PADDING, 6, BADGE_PADDING, 0)
-        draw_text(painter, inner, text, PrintSize.BODY, LIGHT.bad, bold=True)
+        _write(painter, inner, text, PrintSize.BODY, LIGHT.bad, bold=True)
         right -= width + BADGE_PADDING
 
 
-def _paint_footer(report: PrintReport, number: int, painter: QPainter) -> None:
+def _paint_footer(
+    margins: Margins, number: int, n_pages: int, painter: QPainter
+) -> None:
     top = PAGE_HEIGHT - FOOTER
-    painter.setPen(line_pen(LIGHT.edge))
+    painter.setPen(_line_pen(LIGHT.edge))
     painter.drawLine(0, round(top), round(WIDTH), round(top))
     area = QRectF(0, top + 25, WIDTH, PrintSize.SMALL)
-    draw_text(painter, area, report.margins.foot, PrintSize.SMALL, LIGHT.muted)
-    text = translate("paper", "Page {0} of {1}").format(number, report.n_pages)
-    draw_text(painter, area, text, PrintSize.SMALL, LIGHT.text, RIGHT)
-
-
-# The calibration report as pages, as PDF, and on a printer.
-#
-# All three are drawn by the same strokes. The PDF is PDF/A-1b: fonts are in it, colours
-# are defined, and nothing outside of it is needed to show it in decades. Qt writes it,
-# as it draws the preview and reaches the printer; no other library is needed for it.
+    _write(painter, area, margins.foot, PrintSize.SMALL, LIGHT.muted)
+    text = translate("paper", "Page {0} of {1}").format(number, n_pages)
+    at_right = Qt.AlignmentFlag.AlignRight
+    _write(painter, area, text, PrintSize.SMALL, LIGHT.text, at_right)
 
 
 # Qt names it among the colours of each page and draws in none of it; PDF/A-1 has no
@@ -185,15 +304,14 @@ def print_report_of(
     entered: EntryPlace | None = None,
     laboratory: Laboratory | None = None,
 ) -> PrintReport:
-    """Return the pages of the report of a calibration, in the selected language.
+    """Return the report of a calibration, in the selected language.
 
     Without the reestimated images some plots are left out. ``entered`` is the archive
     entry of the calibration, the laboratory where it was made.
     """
-    blocks = calibration_blocks(calibration_file, reestimated, entered, laboratory)
-    return PrintReport(
-        calibration_file.names.operator, _margins(calibration_file), lay_out(blocks)
-    )
+    parts = calibration_parts(calibration_file, reestimated, entered, laboratory)
+    author = calibration_file.names.operator
+    return PrintReport(author, _margins(calibration_file), parts)
 
 
 def pdf_of(
@@ -223,15 +341,16 @@ def paint_on(
     ``progress`` is called with the fraction done, 0 to 1; what it raises ends the work.
     """
     device.setPageLayout(A4)
+    document = lay_out(report.parts)
     painter = QPainter(device)
     times = device.logicalDpiX() / DOTS_AN_INCH
     painter.scale(times, times)
     try:
-        for number in range(1, report.n_pages + 1):
+        for number in range(1, document.pageCount() + 1):
             if number > 1:
                 device.newPage()
-            paint_page(report, number, painter)
-            progress(number / report.n_pages)
+            paint_page(report, document, number, painter)
+            progress(number / document.pageCount())
     finally:
         painter.end()
 

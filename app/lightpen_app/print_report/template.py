@@ -7,46 +7,34 @@ blank lines, and begin with a mark of their size or with what they show:
     :table NAME WIDTHS   columns, > right-aligned, titles, and rows below those of NAME
     :small NAME WIDTHS   the same in small letters
     :charts HEIGHT NAMES plots side by side, mm high
-    :draw NAME           what is drawn by the program
+    :draw NAME           what is made by the program
     :include SECTION     another section
     :keep, :free         what is between stands on one page
 
 A line is left out if one of its values is None; an empty value is a condition that is
-met, or a fact that is not stated.
+met, or a fact that is not stated. What is filled in becomes HTML, as `QTextDocument`
+shows it.
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from functools import cache, partial
+from enum import IntEnum
+from functools import cache
+from html import escape
 
-from PySide6.QtCore import QCoreApplication, QLocale, QRectF
-from PySide6.QtGui import QPainter
+import pyqtgraph as pg
+from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QLocale, QPoint
+from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPicture
 
 from lightpen.model.names import Laboratory
 from lightpen.record.calibrations import TracedItem
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind
 from lightpen_app.look.languages import listed
-from lightpen_app.look.theme import LIGHT
-from lightpen_app.print_report.blocks import (
-    LEFT,
-    MM,
-    RIGHT,
-    WIDTH,
-    Block,
-    Column,
-    PrintSize,
-    draw_text,
-    facts,
-    heading,
-    line_pen,
-    paragraph,
-    subheading,
-    table,
-)
-from lightpen_app.print_report.charts import Chart, row_of_charts
+from lightpen_app.look.theme import LIGHT, TextSize, font, palette_of, scaled
+from lightpen_app.widgets.figure import Figure
 from lightpen_resources import RESOURCES, SOURCE_LANGUAGE
 
 translate = QCoreApplication.translate
@@ -55,15 +43,76 @@ REPORTS = RESOURCES / "reports"
 FIELD = re.compile(r"\{(\w+)\}")
 SECTION = re.compile(r"^\[(\w+)\]$", re.MULTILINE)
 BOLD = "* "
-MARKS: dict[str, Callable[[str], Block]] = {
-    "= ": partial(paragraph, size=PrintSize.TITLE, bold=True),
-    "~ ": partial(paragraph, size=PrintSize.HEADING, color=LIGHT.muted),
-    "# ": heading,
-    "## ": subheading,
-    ", ": partial(paragraph, size=PrintSize.SMALL, color=LIGHT.muted),
-    ". ": partial(paragraph, size=PrintSize.SMALL),
-    BOLD: partial(paragraph, bold=True),
+MARKS = {  # of a paragraph: its tag and its class
+    "= ": ("h1", ""),
+    "~ ": ("p", "lead"),
+    "# ": ("h2", ""),
+    "## ": ("h3", ""),
+    ", ": ("p", "remark"),
+    ". ": ("p", "small"),
+    BOLD: ("p", "strong"),
 }
+ANCHOR = "<a></a>"  # at the beginning of a part, where `pages` looks for it
+MM = 720 / 25.4  # in dots, ten to a point, so that text is measured as printed
+WIDTH = 178 * MM  # of what is on a page
+GAP = 160.0  # between plots side by side, dots
+
+
+class PrintSize(IntEnum):
+    """Sizes of letters, dots."""
+
+    SMALL = 68
+    BODY = 82
+    HEADING = 108
+    TITLE = 190
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The strokes of a plot, without a widget, so that any thread can draw them."""
+
+    strokes: bytes  # as `QPicture` stores them
+    width: int  # px of the plot
+
+    def paint(self, painter: QPainter, width: float) -> None:
+        """Draw it from the origin, as wide as stated."""
+        picture, strokes = QPicture(), QBuffer()
+        strokes.setData(self.strokes)
+        strokes.open(QIODevice.OpenModeFlag.ReadOnly)
+        picture.load(strokes)
+        # A picture enlarges what is drawn by the resolution of the device.
+        own = painter.device().logicalDpiX() / picture.logicalDpiX()
+        painter.scale(width / self.width / own, width / self.width / own)
+        picture.play(painter)
+
+
+def drawn(figure: Figure, width: float, height: float) -> Drawn:
+    """Return a plot as it is printed, width x height in dots, with small letters."""
+    dots = PrintSize.SMALL / scaled(TextSize.SMALL)  # a pixel
+    figure.setPalette(palette_of(LIGHT))
+    figure.resize(round(width / dots), round(height / dots))
+    figure.grab()  # lays it out
+    for view in figure.findChildren(pg.PlotWidget):
+        view.getPlotItem().layout.activate()  # its axes made room for their numbers
+        for item in view.scene().items():
+            if isinstance(item, pg.ScatterPlotItem):
+                item.setExportMode(True, {})  # strokes instead of pixels
+    picture, strokes = QPicture(), QBuffer()
+    painter = QPainter(picture)
+    figure.render(painter, QPoint())
+    painter.end()
+    strokes.open(QIODevice.OpenModeFlag.WriteOnly)
+    picture.save(strokes)
+    return Drawn(bytes(strokes.data().data()), figure.width())
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a report as HTML, with one `ANCHOR`."""
+
+    html: str
+    keeps: bool = False  # whether the beginning of the next is kept on the same page
+    plots: Mapping[str, Drawn] = field(default_factory=dict)  # by names in the HTML
 
 
 @dataclass(frozen=True)
@@ -73,13 +122,121 @@ class Content:
     texts: Mapping[str, str | None]
     tables: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
     strong: Mapping[str, Sequence[int]] = field(default_factory=dict)  # bold rows
-    charts: Mapping[str, Chart | None] = field(default_factory=dict)
-    drawn: Mapping[str, Sequence[Block]] = field(default_factory=dict)
+    charts: Mapping[str, Figure] = field(default_factory=dict)
+    drawn: Mapping[str, Sequence[Part]] = field(default_factory=dict)
 
 
-def fill(section: str, content: Content) -> tuple[Block, ...]:
-    """Return the blocks of a section in the language of the window."""
-    blocks: list[Block] = []
+def print_font(size: float, *, bold: bool = False) -> QFont:
+    """Return the program's font for printing, without screen hinting."""
+    result = font(float(size), bold=bold)
+    result.setHintingPreference(QFont.HintingPreference.PreferNoHinting)
+    return result
+
+
+def printed_text(text: str) -> str:
+    """Return a text with characters missing in all fonts replaced by their codes."""
+    return text if text.isascii() else "".join(map(_printed, text))
+
+
+@cache
+def _printed(character: str) -> str:
+    metrics = QFontMetricsF(print_font(PrintSize.BODY))
+    if character.isspace() or metrics.inFontUcs4(ord(character)):
+        return character
+    return f"[U+{ord(character):04X}]"
+
+
+def markup(text: str) -> str:
+    """Return a text as HTML."""
+    return escape(printed_text(text), quote=False).replace("\n", "<br>")
+
+
+def paragraph(text: str, mark: str = "") -> Part:
+    """Return words, with a mark of the template; a heading keeps what follows."""
+    tag, name = MARKS.get(mark, ("p", ""))
+    html = f'<{tag} class="{name}">{ANCHOR}{markup(text)}</{tag}>'
+    return Part(html, keeps=tag in ("h2", "h3"))
+
+
+def facts(rows: Sequence[tuple[str, str]], n_columns: int = 2) -> tuple[Part, ...]:
+    """Return names with their values, side by side in columns."""
+    name, value = (
+        share / n_columns for share in ((44, 56) if n_columns > 1 else (22, 78))
+    )
+    cells = [
+        f'<td class="name" width="{name}%">{markup(words)}</td>'
+        f'<td class="fact" width="{value}%">{markup(text)}</td>'
+        for words, text in rows
+    ]
+    starts = range(0, len(rows), n_columns)
+    return _table_of("", ["".join(cells[i : i + n_columns]) for i in starts])
+
+
+def table(
+    titles: Sequence[str],
+    widths: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    strong: Sequence[int] = (),
+    name: str = "",
+) -> tuple[Part, ...]:
+    """Return a table whose header is repeated on each page; strong rows are bold.
+
+    The widths are shares; what begins with > is right-aligned. The class of the cells
+    is ``name``.
+    """
+    shares = [float(each.lstrip(">")) for each in widths]
+
+    def line(cells: Sequence[str], kind: str) -> str:
+        return "".join(
+            f'<td class="{kind} {name}" width="{100 * share / sum(shares)}%" '
+            f'align="{"right" if width[0] == ">" else "left"}">{markup(cell)}</td>'
+            for cell, width, share in zip(cells, widths, shares, strict=True)
+        )
+
+    lines = [
+        line(row, "strong" if i in strong else "row") for i, row in enumerate(rows)
+    ]
+    return _table_of(line(titles, "head"), lines)
+
+
+def _table_of(head: str, lines: Sequence[str]) -> tuple[Part, ...]:
+    if not lines:
+        return ()
+    first = lines[0].replace(">", f">{ANCHOR}", 1)
+    body = "".join(f"<tr>{line}</tr>" for line in (first, *lines[1:]))
+    head = f"<thead><tr>{head}</tr></thead>" if head else ""
+    return (Part(f'<table width="100%" cellspacing="0">{head}{body}</table>'),)
+
+
+def charts(plots: Mapping[str, Figure], height: float) -> tuple[Part, ...]:
+    """Return plots side by side, dots high."""
+    if not plots:
+        return ()
+    width = (WIDTH - (len(plots) - 1) * GAP) / len(plots)
+    images = "".join(
+        f'<td><img src="{name}" width="{width}" height="{height}"></td>'
+        for name in plots
+    )
+    (part,) = _table_of("", [images])
+    made = {name: drawn(plot, width, height) for name, plot in plots.items()}
+    return (replace(part, plots=made),)
+
+
+def signatures(by: str) -> Part:
+    """Return the fields for signatures, the first with a title."""
+    below = markup(translate("paper", "Name, date, signature"))
+    names = "".join(
+        f'<td class="signed" width="44%"><b>{markup(name)}</b></td><td></td>'
+        for name in (by, translate("paper", "Checked by"))
+    )
+    fields = f'<td class="signature">{below}</td><td></td>' * 2
+    return _table_of("", [names, fields])[0]
+
+
+def fill(section: str, content: Content) -> tuple[Part, ...]:
+    """Return the parts of a section in the language of the window."""
+    parts: list[Part] = []
     keeps = False
     for stanza in _sections(QLocale().name())[section].split("\n\n"):
         head, *lines = stanza.splitlines()
@@ -87,9 +244,9 @@ def fill(section: str, content: Content) -> tuple[Block, ...]:
         if command in (":keep", ":free"):
             keeps = command == ":keep"
             continue
-        new = _blocks(stanza, command, words, lines, content)
-        blocks += (replace(each, keeps=True) for each in new) if keeps else new
-    return tuple(blocks)
+        new = _parts(stanza, command, words, lines, content)
+        parts += (replace(each, keeps=True) for each in new) if keeps else new
+    return tuple(parts)
 
 
 def condition(is_met: object) -> str | None:
@@ -112,22 +269,21 @@ def _sections(locale: str) -> dict[str, str]:
     }
 
 
-def _blocks(
+def _parts(
     stanza: str,
     command: str,
     words: Sequence[str],
     lines: Sequence[str],
     content: Content,
-) -> Iterable[Block]:
+) -> Iterable[Part]:
     match command:
         case ":include":
             return fill(words[0], content)
         case ":draw":
             return content.drawn[words[0]]
         case ":charts":
-            charts = [content.charts[name] for name in words[1:]]
-            there = [chart for chart in charts if chart is not None]
-            return [row_of_charts(there, float(words[0]) * MM)] if there else ()
+            there = {n: content.charts[n] for n in words[1:] if n in content.charts}
+            return charts(there, float(words[0]) * MM)
         case ":facts":
             n_columns, *name = words
             rows = [row for each in name for row in content.tables[each]]
@@ -137,34 +293,25 @@ def _blocks(
                 [(name, text or unstated) for name, text in rows], int(n_columns)
             )
         case ":table" | ":small":
-            size = PrintSize.BODY if command == ":table" else PrintSize.SMALL
-            return _table(words[0], words[1:], lines, content, size)
+            return _table(command[1:], words[0], words[1:], lines, content)
     if command.startswith(":"):
         raise ValueError(f"A template must have known commands, got {command}.")
     mark = next((each for each in MARKS if stanza.startswith(each)), "")
     texts = list(_filled(stanza.removeprefix(mark).splitlines(), content))
-    return [MARKS.get(mark, paragraph)(" ".join(texts))] if texts else ()
+    return [paragraph(" ".join(texts), mark)] if texts else ()
 
 
 def _table(
-    name: str,
-    widths: Sequence[str],
-    lines: Sequence[str],
-    content: Content,
-    size: PrintSize,
-) -> tuple[Block, ...]:
+    kind: str, name: str, widths: Sequence[str], lines: Sequence[str], content: Content
+) -> tuple[Part, ...]:
     """Return a table of the rows of its name, and of lines below its titles."""
     title, *below = lines
-    columns = [
-        Column(each, float(width.lstrip(">")), RIGHT if width[0] == ">" else LEFT)
-        for each, width in zip(_cells(title), widths, strict=True)
-    ]
     rows, strong = list(content.tables.get(name, ())), [*content.strong.get(name, ())]
     for line in _filled(below, content):
         if line.startswith(BOLD):
             strong.append(len(rows))
         rows.append(_cells(line.removeprefix(BOLD)))
-    return table(columns, rows, strong=strong, size=size)
+    return table(_cells(title), widths, rows, strong=strong, name=kind)
 
 
 def _filled(lines: Iterable[str], content: Content) -> Iterator[str]:
@@ -250,23 +397,3 @@ def record_number(sha256: str) -> str:
     digits = sha256[:NUMBER_LENGTH]
     number = " ".join(digits[i : i + 4] for i in range(0, NUMBER_LENGTH, 4))
     return translate("paper", "No. {0}").format(number)
-
-
-def signatures(by: str) -> Block:
-    """Return the fields for signatures, the first with a title."""
-    names = (by, translate("paper", "Checked by"))
-    below = translate("paper", "Name, date, signature")
-    width, height = WIDTH / 2 - 100, 24 * MM
-
-    def paint(painter: QPainter) -> None:
-        for i, name in enumerate(names):
-            left = i * (WIDTH / 2 + 100)
-            area = QRectF(left, 0, width, PrintSize.BODY)
-            draw_text(painter, area, name, PrintSize.BODY, bold=True)
-            line = height - 1.6 * PrintSize.SMALL
-            painter.setPen(line_pen(LIGHT.text))
-            painter.drawLine(round(left), round(line), round(left + width), round(line))
-            area = QRectF(left, line + 15, width, PrintSize.SMALL)
-            draw_text(painter, area, below, PrintSize.SMALL, LIGHT.muted)
-
-    return Block(paint, height, space=200)

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QCoreApplication, QPointF, QRectF
-from PySide6.QtGui import QColor, QPainter
+from PySide6.QtCore import QCoreApplication
 
-from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import InputFile
 from lightpen.model.names import Laboratory, Origin
@@ -22,43 +20,29 @@ from lightpen.record.folder import BALL_CENTRE, MEASURED_PART, StoredVerificatio
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen_app.look.languages import worded
 from lightpen_app.look.phrases import grade_text, origin_text
-from lightpen_app.look.theme import LIGHT
 from lightpen_app.look.words import number_text
-from lightpen_app.print_report.blocks import (
-    MM,
-    RIGHT,
-    WIDTH,
-    Block,
-    Column,
-    PrintSize,
-    draw_text,
-    facts,
-    heading,
-    line_pen,
-    subheading,
-    table,
-    text_height,
-    text_width,
-)
-from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
+from lightpen_app.print_report.pages import Margins, PrintReport
 from lightpen_app.print_report.template import (
     Content,
+    Part,
     condition,
     environment_texts,
+    facts,
     fill,
     laboratory_texts,
+    paragraph,
     proof_texts,
     record_number,
     signatures,
+    table,
     traced_rows,
     zoned_moment_text,
 )
+from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.result_plots import ArrowPlot
 
 translate = QCoreApplication.translate
 
-HEIGHT = 80 * MM  # of the plot
-DOT = 22.0  # dots, across
-WHISKER = 200.0  # times a deviation is drawn
 N_DECIMALS = 4
 FIGURES = (
     *("nominal", "lower_limit", "upper_limit", "actual", "deviation"),
@@ -66,11 +50,11 @@ FIGURES = (
 )
 
 
-def part_blocks(record: Mapping[str, Any]) -> tuple[Block, ...]:
+def part_parts(record: Mapping[str, Any]) -> tuple[Part, ...]:
     """Return characteristics, budget, features, alignment, points and plan."""
     characteristics, alignment = record["characteristics"], record["alignment"]
     rejected = [i for i, e in enumerate(characteristics) if e["decision"] == "rejected"]
-    point_texts, points = _points(record["touches"])
+    point_texts, plots = _points(record["touches"])
     texts = {
         "aligned": condition(alignment is not None),
         "unaligned": condition(alignment is None),
@@ -96,7 +80,7 @@ def part_blocks(record: Mapping[str, Any]) -> tuple[Block, ...]:
         ],
     }
     strong = {"characteristics": rejected}
-    return fill("part", Content(texts, tables, strong, drawn={"points": points}))
+    return fill("part", Content(texts, tables, strong, charts=plots))
 
 
 def _text(value: float | None) -> str:
@@ -141,70 +125,28 @@ def _alignment_rows(alignment: dict[str, Any] | None) -> list[tuple[str, ...]]:
 
 def _points(
     touches: list[dict[str, Any]],
-) -> tuple[dict[str, str | None], tuple[Block, ...]]:
+) -> tuple[dict[str, str | None], dict[str, Figure]]:
     """Return a plot of all points with their deviations, from the flattest side."""
     points = np.array([each["point_cam_mm"] for each in touches])
     off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     texts: dict[str, str | None] = {
-        "n_points": str(len(points)) if len(axes) > 1 else None,
-        "enlargement": f"{WHISKER:.0f}",
+        "n_points": None,
+        "enlargement": None,
         "largest_deviation": _text(float(np.linalg.norm(off, axis=1).max())),
     }
     if len(axes) < 2:
-        return texts, ()
+        return texts, {}
     flat = (points - middle) @ axes[:2].T
-    ends = flat + WHISKER * off @ axes[:2].T
-    plot = Block(lambda painter: _draw(painter, flat, ends, touches), HEIGHT, space=60)
-    return texts, (plot,)
-
-
-def _draw(
-    painter: QPainter, flat: FloatArray, ends: FloatArray, touches: list[dict[str, Any]]
-) -> None:
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    room = np.array([0.8 * WIDTH, 0.8 * HEIGHT])
-    scale = float((room / np.maximum(high - low, 1.0)).min())
-    center = np.array([WIDTH / 2, HEIGHT / 2])
-
-    def placed(points: FloatArray) -> list[QPointF]:
-        at = (points - (low + high) / 2) * scale + center
-        return [QPointF(*each) for each in at.tolist()]
-
-    painter.setPen(line_pen(LIGHT.pointer, 10.0))
-    dots = placed(flat)
-    for dot, end in zip(dots, placed(ends), strict=True):
-        painter.drawLine(dot, end)
-    painter.setPen(line_pen(LIGHT.text))
-    painter.setBrush(QColor(LIGHT.text))
-    for dot in dots:
-        painter.drawEllipse(dot, DOT, DOT)
-    names = [each["feature"] for each in touches]
-    taken = [QRectF(dot.x() - DOT, dot.y() - DOT, 2 * DOT, 2 * DOT) for dot in dots]
-    for name in dict.fromkeys(names):
-        own = np.array([each == name for each in names])
-        (place,) = placed(flat[own].mean(axis=0, keepdims=True))
-        area = _free_area(place, name, taken)
-        taken.append(area)
-        draw_text(painter, area, name, PrintSize.SMALL, LIGHT.muted)
-
-
-def _free_area(place: QPointF, text: str, taken: list[QRectF]) -> QRectF:
-    """Return the nearest position of a text to a place where it covers least."""
-    width = text_width(text, PrintSize.SMALL) + DOT
-    height = text_height(text, PrintSize.SMALL, width)
-    areas = [
-        QRectF(place.x() + across * width, place.y() + up * height, width, height)
-        for up in sorted(np.arange(-4, 4, 0.5).tolist(), key=lambda x: abs(x + 0.5))
-        for across in (-0.5, 0.1, -1.1)
-    ]
-
-    def covered(area: QRectF) -> float:
-        shared = [area.intersected(each) for each in taken]
-        return sum(each.width() * each.height() for each in shared)
-
-    return min(areas, key=covered)
+    plot = ArrowPlot(Axes("", "mm", "mm"))
+    plot.set_data(None, flat, off @ axes[:2].T)
+    plot.mark(flat)
+    names = np.array([each["feature"] for each in touches])
+    each = list(dict.fromkeys(names.tolist()))
+    plot.set_labels(np.array([flat[names == n].mean(axis=0) for n in each]), each)
+    texts |= {"n_points": str(len(points)), "enlargement": f"{plot.scale():g}"}
+    return texts, {"points": plot}
 
 
 # Entries of the record that are elsewhere in the report, or too long for it.
@@ -272,10 +214,10 @@ def verification_print_report(
         "files": _file_rows(inputs),
     }
     drawn = {
-        "figures": part_blocks(record) if is_part else tuple(_figures(record)),
+        "figures": part_parts(record) if is_part else tuple(_figures(record)),
         "signatures": [signatures(by)],
     }
-    blocks = fill("verification", Content(texts, tables, drawn=drawn))
+    parts = fill("verification", Content(texts, tables, drawn=drawn))
     items = (each or "\u2013" for each in (done.pen, done.tip, done.verification))
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
     margins = Margins(
@@ -285,7 +227,7 @@ def verification_print_report(
         badges=_badges(done),
         foot=foot.format(file.sha256),
     )
-    return PrintReport(done.operator, margins, lay_out(blocks))
+    return PrintReport(done.operator, margins, parts)
 
 
 def verification_stem(file: Path, done: StoredVerification) -> str:
@@ -316,24 +258,24 @@ def _verdict_texts(done: StoredVerification, verdict: Any) -> dict[str, str | No
     }
 
 
-def _figures(record: Mapping[str, Any]) -> Iterator[Block]:
-    yield heading(translate("paper", "Figures, as the JSON file names them"))
+def _figures(record: Mapping[str, Any]) -> Iterator[Part]:
+    yield paragraph(translate("paper", "Figures, as the JSON file names them"), "# ")
     yield from _values(record)
     for name, value in record.items():
         if name in ELSEWHERE:
             continue
         if isinstance(value, Mapping):
-            yield subheading(_title(name))
+            yield paragraph(_title(name), "## ")
             yield from _values(value)
             yield from _tables(value)
         elif _is_list_of(value, Mapping):
             for i, each in enumerate(value[:LONGEST_TABLE], 1):
-                yield subheading(f"{_title(name)} {i}")
+                yield paragraph(f"{_title(name)} {i}", "## ")
                 yield from _values(each)
     yield from _tables(record)
 
 
-def _values(of: Mapping[str, Any]) -> tuple[Block, ...]:
+def _values(of: Mapping[str, Any]) -> tuple[Part, ...]:
     """Return numbers, words, and short lists of numbers."""
     rows = [
         (_title(name), _plain(name, value))
@@ -343,7 +285,7 @@ def _values(of: Mapping[str, Any]) -> tuple[Block, ...]:
     return facts(rows, n_columns=1) if rows else ()
 
 
-def _tables(of: Mapping[str, Any]) -> Iterator[Block]:
+def _tables(of: Mapping[str, Any]) -> Iterator[Part]:
     """Yield points, and longer lists of numbers."""
     for name, value in of.items():
         if name in ELSEWHERE or _is_short(value):
@@ -352,14 +294,14 @@ def _tables(of: Mapping[str, Any]) -> Iterator[Block]:
             value = [[each] for each in value]
         if not (_is_list_of(value, list) and all(map(_is_short, value))):
             continue
-        yield subheading(_title(name))
+        yield paragraph(_title(name), "## ")
         n_columns = max(map(len, value), default=0)
-        columns = [Column("", 0.5), *(Column("", 1.0, RIGHT),) * n_columns]
+        titles, widths = [""] * (n_columns + 1), ["0.5", *[">1"] * n_columns]
         rows = [
             [str(i), *(_number(name, x) for x in each), *[""] * (n_columns - len(each))]
             for i, each in enumerate(value[:LONGEST_TABLE], 1)
         ]
-        yield from table(columns, rows)
+        yield from table(titles, widths, rows)
 
 
 def _file_rows(inputs: Any) -> list[tuple[str, str, str]]:

@@ -9656,10 +9656,6 @@ needed</source>
         <translation>各 LED 的残差 / px</translation>
     </message>
     <message>
-        <source>U (k = 2) by source, weakest direction / µm</source>
-        <translation>各来源的 U (k = 2)，最弱方向 / µm</translation>
-    </message>
-    <message>
         <source>Tip per image relative to the cone / µm</source>
         <translation>单幅图像测头相对锥孔的偏差 / µm</translation>
     </message>
@@ -9684,8 +9680,20 @@ needed</source>
         <translation>LED</translation>
     </message>
     <message>
+        <source>included</source>
+        <translation>已计入</translation>
+    </message>
+    <message>
+        <source>excluded</source>
+        <translation>已剔除</translation>
+    </message>
+    <message>
         <source>RMS residual per image / px</source>
         <translation>各图像的残差均方根 / px</translation>
+    </message>
+    <message>
+        <source>U (k = 2) by source, weakest direction / mm</source>
+        <translation>各来源的 U (k = 2)，最弱方向 / mm</translation>
     </message>
     <message>
         <source>Residuals over the image × {0}</source>

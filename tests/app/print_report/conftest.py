@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 from benchmarks.small_records import record_of
 from PySide6.QtCore import QBuffer, QSize
-from PySide6.QtGui import QPainter
+from PySide6.QtGui import QPainter, QTextDocument
 from PySide6.QtSvg import QSvgGenerator
 
 from lightpen.estimation.reports.verdict import Grade
@@ -23,10 +23,12 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.recomputing import reestimate_poses
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.header import Names
+from lightpen_app.look.words import BREAK
 from lightpen_app.print_report.pages import (
     PAGE_HEIGHT,
     PAGE_WIDTH,
     PrintReport,
+    lay_out,
     paint_page,
     print_report_of,
 )
@@ -34,17 +36,18 @@ from lightpen_app.print_report.pages import (
 SVG = "{http://www.w3.org/2000/svg}text"
 
 
-def _words_on(paper: PrintReport, number: int) -> list[str]:
+def _words_on(paper: PrintReport, document: QTextDocument, number: int) -> list[str]:
     """Return what is written on a page, each line of it."""
     buffer = QBuffer()
     generator = QSvgGenerator()
     generator.setOutputDevice(buffer)
     generator.setSize(QSize(round(PAGE_WIDTH), round(PAGE_HEIGHT)))
     painter = QPainter(generator)
-    paint_page(paper, number, painter)
+    paint_page(paper, document, number, painter)
     painter.end()
     tree = ElementTree.fromstring(buffer.data().data())
-    return ["".join(each.itertext()).strip() for each in tree.iter(SVG)]
+    texts = ["".join(each.itertext()).strip() for each in tree.iter(SVG)]
+    return [text for text in texts if text != BREAK]
 
 
 @pytest.fixture
@@ -108,6 +111,8 @@ def words() -> Callable[[PrintReport], list[list[str]]]:
     """Return a function that reads what is written on each page, line by line."""
 
     def read(paper: PrintReport) -> list[list[str]]:
-        return [_words_on(paper, number) for number in range(1, paper.n_pages + 1)]
+        document = lay_out(paper.parts)
+        numbers = range(1, document.pageCount() + 1)
+        return [_words_on(paper, document, number) for number in numbers]
 
     return read

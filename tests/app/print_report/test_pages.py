@@ -1,104 +1,79 @@
-"""Where pieces stand on pages."""
+"""Where parts stand on pages."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
-from PySide6.QtGui import QPainter
+import pytest
+from PySide6.QtGui import QTextDocument
 
-from lightpen_app.print_report.blocks import (
-    Block,
-    Column,
-    PrintSize,
-    heading,
-    table,
-    text_width,
-)
-from lightpen_app.print_report.charts import fitting_size
-from lightpen_app.print_report.pages import PlacedBlock, lay_out
+from lightpen_app.look.words import unbroken
+from lightpen_app.print_report.pages import ROOM, lay_out
+from lightpen_app.print_report.template import Part, charts, paragraph, table
+from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.plots import Curve
+from lightpen_app.widgets.result_plots import LinePlot
 
-ROOM = 100.0
+pytestmark = pytest.mark.usefixtures("qapp")
+N_LINES = 44  # paragraphs of a line that fit on a page
 
 
-def paint_nothing(_: QPainter) -> None:
-    """Draw nothing: pages are put together without it."""
+def lines(n: int) -> tuple[Part, ...]:
+    return tuple(paragraph(f"line {i}") for i in range(n))
 
 
-def block(height: float, space: float = 0.0) -> Block:
-    return Block(paint_nothing, height, space)
+def pages_of(document: QTextDocument) -> Iterator[tuple[str, int]]:
+    """Yield what stands in the document, and on which page, from 0."""
+    block = document.begin()
+    while block.isValid():
+        place = document.documentLayout().blockBoundingRect(block)
+        yield unbroken(block.text()), int((place.bottom() - 1) // ROOM)
+        block = block.next()
 
 
-def tops(page: tuple[PlacedBlock, ...]) -> list[float]:
-    return [placed.top for placed in page]
+def test_parts_go_on_on_the_next_page() -> None:
+    found = dict(pages_of(lay_out(lines(2 * N_LINES))))
+
+    assert found["line 0"] == 0
+    assert found[f"line {2 * N_LINES - 1}"] > 0
 
 
-def test_blocks_stand_below_each_other_and_go_on_on_the_next_page() -> None:
-    pages = lay_out([block(40), block(40, space=10), block(40, space=10)], ROOM)
+@pytest.mark.parametrize("n_before", range(N_LINES - 6, N_LINES + 2))
+def test_a_heading_is_on_the_page_of_what_follows(n_before: int) -> None:
+    rows = [(str(i), "0.003") for i in range(9)]
+    leds = table(["LED", "rms"], ["1", ">1"], rows)
+    parts = (*lines(n_before), paragraph("LEDs", "# "), *leds, *lines(2))
 
-    assert [tops(page) for page in pages] == [[0, 50], [0]]
+    found = list(pages_of(lay_out(parts)))
 
-
-def test_what_fills_a_page_to_its_end_stays_on_it() -> None:
-    assert len(lay_out([block(60), block(40)], ROOM)) == 1
-    assert len(lay_out([block(60), block(41)], ROOM)) == 2
-
-
-def test_a_heading_goes_with_what_follows() -> None:
-    title = replace(block(20), keeps=True)
-
-    first, second = lay_out([block(60), title, block(40)], ROOM)
-
-    assert second[0].block is title
-    assert len(first) == 1
+    pages = dict(found)
+    assert pages["LEDs"] == pages["LED"] == pages["0"]
+    at = found.index(("LEDs", pages["LEDs"]))
+    assert [text for text, _ in found[:at] if text][-1] == f"line {n_before - 1}"
+    assert [page for _, page in found] == sorted(page for _, page in found)
 
 
-def test_a_block_higher_than_a_page_has_one_to_itself() -> None:
-    pages = lay_out([block(10), block(300), block(10)], ROOM)
+def test_what_is_kept_stands_on_one_page() -> None:
+    kept = [replace(paragraph(f"kept {i}"), keeps=True) for i in range(9)]
 
-    assert [len(page) for page in pages] == [1, 1, 1]
+    found = dict(pages_of(lay_out([*lines(N_LINES - 4), *kept, paragraph("end")])))
+
+    assert found["kept 0"] == found["kept 8"] == found["end"] == 1
+    assert found[f"line {N_LINES - 5}"] == 0
 
 
 def test_the_head_of_a_table_is_repeated_where_it_goes_on() -> None:
-    rows = table([Column("LED"), Column("rms")], [(str(i), "0.003") for i in range(9)])
-    room = rows[0].height + 5 * rows[1].height
+    rows = [(str(i),) for i in range(3 * N_LINES)]
 
-    pages = lay_out(rows, room)
+    document = lay_out(table(["LED"], ["1"], rows))
 
-    assert len(pages) == 2
-    assert all(page[0].block is rows[0] for page in pages)
-    shown = [placed.block for page in pages for placed in page[1:]]
-    assert shown == list(rows[1:])
+    assert document.pageCount() > 1
+    (frame,) = document.rootFrame().childFrames()
+    assert frame.format().toTableFormat().headerRowCount() == 1
 
 
-def test_the_last_row_of_a_table_does_not_stand_alone() -> None:
-    rows = table([Column("LED")], [(str(i),) for i in range(6)])
+def test_plots_are_as_wide_and_high_as_stated() -> None:
+    plot = LinePlot(Axes("tip"), [Curve("x")])
+    document = lay_out(charts({"tip": plot}, 1000.0))
 
-    pages = lay_out(rows, rows[0].height + 5 * rows[1].height)
-
-    assert [len(page) for page in pages] == [5, 3]
-
-
-def test_the_first_row_of_a_table_does_not_stand_alone() -> None:
-    rows = table([Column("LED")], [(str(i),) for i in range(6)])
-    head = rows[0].height + rows[0].space
-
-    pages = lay_out([block(50), *rows], 50 + head + 1.5 * rows[1].height)
-
-    assert len(pages[0]) == 1
-    assert pages[1][0].block is rows[0]
-
-
-def test_a_title_keeps_off_the_names_of_series_beside_it() -> None:
-    title = "Tip from the first n images minus result / µm"
-    whole = text_width(title, PrintSize.BODY, bold=True)
-
-    assert fitting_size(title, whole) == PrintSize.BODY
-    size = fitting_size(title, 0.9 * whole)
-    assert text_width(title, size, bold=True) <= 0.91 * whole
-
-
-def test_no_heading_ends_a_page() -> None:
-    blocks = [block(10), heading("Images"), replace(block(20), keeps=True), block(30)]
-    room = sum(each.height + each.space for each in blocks[:-1])
-
-    _, second = lay_out(blocks, room)
-
-    assert len(second) == 3
+    assert document.documentLayout().documentSize().height() >= 1000
+    assert document.pageCount() == 1

@@ -16,7 +16,7 @@ from tests.app.patience import PATIENCE_MS
 
 from lightpen.record.results.results import Result
 from lightpen_app.print_report.control import PrintReportWindow
-from lightpen_app.print_report.pages import PrintReport, paint_on, paint_page
+from lightpen_app.print_report.pages import PrintReport, lay_out, paint_on, paint_page
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
@@ -98,7 +98,7 @@ def test_a_printer_gets_every_page(
     paint_on(paper, printer)
 
     pdf = (tmp_path / "printed.pdf").read_bytes()
-    assert f"/Count {paper.n_pages}".encode() in pdf
+    assert f"/Count {lay_out(paper.parts).pageCount()}".encode() in pdf
 
 
 def test_a_window_that_is_closed_while_it_saves_saves_all_the_same(

@@ -17,23 +17,21 @@ from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.figures import arrow_scale, budget_figure
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, LIGHT, TextSize, apply_theme, font
-from lightpen_app.steps.review.plots_panel import HEAD, BudgetPlot
-from lightpen_app.steps.review.residual_plots import (
-    ArrowPlot,
-    DotPlot,
-    Histogram,
-    MisfitPlot,
-)
-from lightpen_app.steps.review.series_plots import (
-    BarPlot,
-    LinePlot,
-    PlotCard,
-    PlotGrid,
-    PosturePlot,
-)
+from lightpen_app.steps.review.plot_cards import PlotCard, PlotGrid
+from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.swing.view import SwingPlots
 from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plots import Canvas, Curve, Plot, TracePlot
+from lightpen_app.widgets.result_plots import (
+    HEAD,
+    ArrowPlot,
+    BarPlot,
+    BudgetPlot,
+    DotPlot,
+    Histogram,
+    LinePlot,
+    PosturePlot,
+)
 
 IMAGES = np.arange(1.0, 6.0)
 VALUES = np.array([0.06, 0.05, np.nan, 0.07, 0.06])

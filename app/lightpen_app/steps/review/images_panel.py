@@ -20,13 +20,13 @@ from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.image_table import ImageTable
+from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.residual_plots import (
     NO_ARROWS,
     Arrows,
     MisfitPlot,
     ResidualView,
 )
-from lightpen_app.steps.review.series_plots import PlotCard
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.fitting import NO_ROOM, ResponsiveLayout

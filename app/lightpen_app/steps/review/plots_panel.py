@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from PySide6.QtCore import QRectF, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
@@ -18,71 +17,26 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import Rig
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.status import FailedSwing
-from lightpen_app.look.figures import BudgetFigure, Drawing, budget_figure, paint_budget
+from lightpen_app.look.figures import budget_figure
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, set_tooltip
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
-from lightpen_app.steps.review.residual_plots import ArrowPlot, DotPlot, Histogram
-from lightpen_app.steps.review.series_plots import (
-    BarPlot,
-    LinePlot,
-    PlotCard,
-    PlotGrid,
-    PosturePlot,
-)
+from lightpen_app.steps.review.plot_cards import PlotCard, PlotGrid
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.live_markers import CameraSwitch
 from lightpen_app.widgets.plots import Curve
+from lightpen_app.widgets.result_plots import (
+    ArrowPlot,
+    BarPlot,
+    BudgetPlot,
+    DotPlot,
+    Histogram,
+    LinePlot,
+    PosturePlot,
+)
 from lightpen_app.widgets.tables import Figures, NumberTable
-
-HEAD = 4 * GRID  # px, above the bars
-
-
-class BudgetPlot(Figure):
-    """Shows the parts of U as horizontal bars, with its limit."""
-
-    def __init__(self, axes: Axes) -> None:
-        super().__init__()
-        self._value = BudgetFigure()
-        self.set_axes(axes)
-
-    def value(self) -> BudgetFigure:
-        """Return the figure that is shown."""
-        return self._value
-
-    def set_value(self, value: BudgetFigure) -> None:
-        """Show another figure."""
-        self._value = value
-        line = QFontMetricsF(font(TextSize.SMALL)).height()
-        self.setMinimumHeight(HEAD + round((len(value.bars) + 1) * line) + 2 * GRID)
-        self._columns = {
-            "part": tuple(bar.name for bar in value.bars),
-            "expanded_uncertainty_mm": np.array([bar.value for bar in value.bars]),
-            "assumed": tuple(str(bar.assumed).lower() for bar in value.bars),
-        }
-        self.update()
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        colors, small = colors_of(self.palette()), font(TextSize.SMALL)
-        with QPainter(self) as painter:
-            painter.fillRect(self.rect(), QColor(colors.panel))
-            painter.setPen(QColor(colors.text))
-            painter.setFont(small)
-            area = QRectF(self.rect()).adjusted(GRID // 2, GRID // 2, -GRID, -GRID)
-            painter.drawText(area, self._axes.title)
-            area.setTop(area.top() + HEAD)
-            if self._value.bars:
-                bold = font(TextSize.SMALL, bold=True)
-                drawing = Drawing(small, bold, colors, 1.0, mm_text)
-                paint_budget(painter, area, self._value, drawing)
-
-    @override
-    def _restyle(self) -> None:
-        self.update()
-
 
 SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a plot
 

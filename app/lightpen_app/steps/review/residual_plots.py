@@ -1,4 +1,4 @@
-"""Plots of residuals: by image, over the image, and their distribution."""
+"""Residuals by image, and over an image."""
 
 from dataclasses import dataclass
 
@@ -6,11 +6,11 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QPoint, QPointF, QRectF, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QGraphicsRectItem, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen_app.look.figures import MANY, arrow_lines, arrow_scale, cell_means
+from lightpen_app.look.figures import arrow_lines
 from lightpen_app.look.theme import DARK, GRID, TextSize, colors_of, font
 from lightpen_app.look.words import number_text
 from lightpen_app.widgets.figure import Axes
@@ -19,7 +19,6 @@ from lightpen_app.widgets.plots import Plot
 
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.94
-N_BINS = 41
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
 LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
@@ -196,169 +195,6 @@ class MisfitPlot(Plot):
     ) -> None:
         if len(points):
             self.number_chosen.emit(int(points[0].data()))
-
-
-class SquarePlot(Plot):
-    """A plot with equal units of x and y that keeps a range visible."""
-
-    def __init__(self, axes: Axes) -> None:
-        super().__init__(axes)
-        self._range = QRectF(0, 0, 1, 1)
-        self._item.setAspectLocked(True)
-
-        # Connections
-        self._item.vb.sigResized.connect(self._show_range)
-
-    def set_range(self, shown: QRectF) -> None:
-        """Keep a range in sight, whatever the size of the plot."""
-        self._range = shown
-        self._show_range()
-
-    def _show_range(self, _view: object = None) -> None:
-        self._item.setRange(self._range, padding=0.02)
-
-
-class DotPlot(SquarePlot):
-    """Dots of (x, y), such as residuals along the axes of the image.
-
-    ``names`` are the columns of the CSV file.
-    """
-
-    def __init__(self, axes: Axes, names: tuple[str, str]) -> None:
-        self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes)
-        self._names = names
-        self._dots = pg.ScatterPlotItem(pxMode=True, size=4)
-        self._item.addItem(self._dots)
-        self._restyle()
-
-    def set_data(self, x: FloatArray, y: FloatArray) -> None:
-        """Show dots at x (N,), y (N,); zero is in the middle."""
-        assert self._dots is not None
-        self._dots.setData(x, y)
-        self._columns = dict(zip(self._names, (x, y), strict=True))
-        reach = float(np.abs(np.concatenate([x, y])).max(initial=0.0)) or 1.0
-        self.set_range(QRectF(-reach, -reach, 2 * reach, 2 * reach))
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._dots is not None:
-            color = QColor(colors_of(self.palette()).accent)
-            color.setAlphaF(0.6)
-            self._dots.setPen(pg.mkPen(None))
-            self._dots.setBrush(pg.mkBrush(color))
-
-
-class ArrowPlot(SquarePlot):
-    """Residuals as enlarged arrows over the image, where they should look random.
-
-    Of many arrows, the means in cells of the image are drawn: a pattern stands out of
-    the noise then. The CSV file holds them all.
-    """
-
-    def __init__(self, axes: Axes) -> None:
-        self._shafts: pg.PlotCurveItem | None = None
-        super().__init__(axes)
-        self._scale = 1.0
-        self._item.invertY(True)
-        self._frame = QGraphicsRectItem()
-        self._shafts = pg.PlotCurveItem(connect="pairs")
-        self._item.addItem(self._frame, ignoreBounds=True)
-        self._item.addItem(self._shafts)
-        self._restyle()
-
-    def scale(self) -> float:
-        """Return the magnification of the arrows."""
-        return self._scale
-
-    def set_data(
-        self, image_size: tuple[int, int], points: FloatArray, residuals: FloatArray
-    ) -> None:
-        """Show residuals (N, 2) at points (N, 2), px, in an image (width, height)."""
-        assert self._shafts is not None
-        frame = QRectF(-0.5, -0.5, *image_size)
-        shown = _around(points) if len(points) else frame
-        starts, vectors = points, residuals
-        if len(points) > MANY:
-            starts, vectors = cell_means(points, residuals)
-        self._scale = arrow_scale(vectors, shown.width())
-        self._shafts.setData(*arrow_lines(starts, vectors * self._scale))
-        self._frame.setRect(frame)
-        self.set_range(shown)
-        self._columns = {
-            "x_px": points[:, 0],
-            "y_px": points[:, 1],
-            "residual_x_px": residuals[:, 0],
-            "residual_y_px": residuals[:, 1],
-        }
-
-    def lines(self) -> tuple[FloatArray, FloatArray]:
-        """Return the ends x (6 N,), y (6 N,) of shafts and heads, in pairs."""
-        assert self._shafts is not None
-        x, y = self._shafts.getData()
-        return x, y
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._shafts is not None:
-            colors = colors_of(self.palette())
-            self._shafts.setPen(pg.mkPen(colors.accent, width=1))
-            border = QPen(QColor(colors.edge))
-            border.setCosmetic(True)
-            self._frame.setPen(border)
-
-
-class Histogram(Plot):
-    """Histogram of the residuals with the fitted normal curve.
-
-    ``name`` is the column of the CSV file that holds the middles of the bins.
-    """
-
-    def __init__(self, axes: Axes, name: str) -> None:
-        self._bars: pg.BarGraphItem | None = None
-        super().__init__(axes)
-        self._name = name
-        self._bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
-        self._normal = pg.PlotCurveItem()
-        self._item.addItem(self._bars)
-        self._item.addItem(self._normal)
-        self._restyle()
-
-    def set_data(self, values: FloatArray) -> None:
-        """Show the distribution of values (N,)."""
-        assert self._bars is not None
-        if not len(values):
-            return
-        reach = float(np.abs(values).max()) or 1.0
-        heights, edges = np.histogram(values, N_BINS, (-reach, reach))
-        middles = (edges[1:] + edges[:-1]) / 2
-        step = edges[1] - edges[0]
-        self._bars.setOpts(x=middles, height=heights, width=0.9 * step)
-        fine = np.linspace(-reach, reach, 200)
-        sigma = float(np.sqrt(np.mean(values**2))) or 1.0
-        density = np.exp(-0.5 * (fine / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
-        expected = len(values) * step * density
-        self._normal.setData(fine, expected)
-        self._columns = {self._name: middles, "count": heights.astype(np.float64)}
-        self._fit(edges, np.concatenate([heights, expected]), y_zero=True)
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._bars is not None:
-            colors = colors_of(self.palette())
-            self._bars.setOpts(pen=pg.mkPen(None), brush=QColor(colors.partial))
-            self._normal.setPen(pg.mkPen(colors.text, width=1))
-
-
-def _around(points: FloatArray) -> QRectF:
-    """Return the rectangle around points (N, 2), with room for arrows."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    room = 0.06 * max(float(np.max(high - low)), 1.0)
-    width, height = (high - low + 2 * room).tolist()
-    return QRectF(float(low[0]) - room, float(low[1]) - room, width, height)
 
 
 ROOM = 1.5  # times the extent of the pen, that is shown at first

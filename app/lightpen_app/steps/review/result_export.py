@@ -42,7 +42,7 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
-    from lightpen_app.steps.review.series_plots import NamedPicture
+    from lightpen_app.steps.review.plot_cards import NamedPicture
 
 
 LONGEST = 200  # characters

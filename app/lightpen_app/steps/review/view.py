@@ -43,8 +43,8 @@ from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plot_cards import NamedPicture
     from lightpen_app.steps.review.plots_panel import PlotsPanel
-    from lightpen_app.steps.review.series_plots import NamedPicture
 
 
 class DetailTabs(QTabWidget):

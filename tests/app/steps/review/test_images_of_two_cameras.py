@@ -17,8 +17,9 @@ from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
-from lightpen_app.steps.review.residual_plots import ArrowPlot, ResidualView
+from lightpen_app.steps.review.residual_plots import ResidualView
 from lightpen_app.widgets.live_markers import CameraSwitch
+from lightpen_app.widgets.result_plots import ArrowPlot
 from lightpen_app.widgets.state_banner import SignLabel
 
 

@@ -12,7 +12,7 @@ from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.record.swings.solving import RecordSource, Solution
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
-from lightpen_app.steps.review.residual_plots import ArrowPlot
+from lightpen_app.widgets.result_plots import ArrowPlot
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -67,6 +67,7 @@ from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.page import ReviewPage
+from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot, ResidualView
 from lightpen_app.steps.review.result_export import LaboratoryDialog, ResultTools
@@ -77,7 +78,6 @@ from lightpen_app.steps.review.result_panel import (
     TipSummary,
     TipValue,
 )
-from lightpen_app.steps.review.series_plots import PlotCard
 from lightpen_app.widgets.bars import JobProgress, QuestionBar, ReasonBar, WithdrawalBar
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.figure import MARK_HEIGHT, PNG_SCALE, Figure
