@@ -215,7 +215,6 @@ class SizeClass:
     is_narrow: bool = False
     is_low: bool = False
     is_large: bool = False
-    is_very_large: bool = False  # whether there is room for more than the essentials
 
     @property
     def margin(self) -> int:
@@ -235,9 +234,7 @@ class ResponsiveLayout(WidgetMixin):
     # px; with less width or height it is short of room.
     narrow_below = 0
     low_below = 0
-    # Sizes from which the layout is large or very large; None: never.
-    large_from: QSize | None = None
-    very_large_from: QSize | None = None
+    large_from: QSize | None = None  # None: never large
     _room = SizeClass()
 
     def _use_room(self) -> None:
@@ -252,7 +249,6 @@ class ResponsiveLayout(WidgetMixin):
             is_narrow=size.width() < self.narrow_below,
             is_low=size.height() < self.low_below,
             is_large=_holds(size, self.large_from),
-            is_very_large=_holds(size, self.very_large_from),
         )
         if room != self._room:
             self._room = room

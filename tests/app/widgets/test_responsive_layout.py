@@ -10,7 +10,7 @@ from lightpen_app.widgets.fitting import ResponsiveLayout, SizeClass
 
 class Arranged(ResponsiveLayout, QWidget):
     narrow_below, low_below = 300, 200
-    large_from, very_large_from = QSize(600, 500), QSize(1200, 900)
+    large_from = QSize(600, 500)
 
     def __init__(self) -> None:
         super().__init__()
@@ -46,8 +46,4 @@ def test_plenty_of_room_is_reported_where_there_is_plenty_both_ways(
     for size in ((900, 499), (600, 500), (1200, 900), (599, 900)):
         widget.resize(*size)
 
-    assert widget.arranged_for == [
-        SizeClass(is_large=True),
-        SizeClass(is_large=True, is_very_large=True),
-        SizeClass(),
-    ]
+    assert widget.arranged_for == [SizeClass(is_large=True), SizeClass()]

@@ -1,6 +1,5 @@
 """The step LEDs: coordinates, checked against pen frame and live images."""
 
-from PySide6.QtCore import QSize
 from typing_extensions import override
 
 from lightpen.pen_check.draft import PenDraft, corrected, exchanged
@@ -28,7 +27,7 @@ from lightpen_app.widgets.tables import UndoButtons
 from lightpen_app.work.workbench import Workbench
 
 # Of table, pen in space and image
-SHARES, VERY_LARGE_SHARES = (40, 29, 31), (26, 32, 42)
+SHARES = 40, 29, 31
 
 
 class LedsPage(ResponsiveLayout, Page):
@@ -42,7 +41,6 @@ class LedsPage(ResponsiveLayout, Page):
     shows_images = True
     narrow_below = 110 * GRID  # px; then two panels are side by side, not three
     low_below = 62 * GRID  # px; then it scrolls
-    very_large_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
 
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
@@ -68,11 +66,10 @@ class LedsPage(ResponsiveLayout, Page):
         self._content = ShrinkingScrollContent()
         self._rows = vertical_layout(self._content, self._file, spacing=2 * GRID)
         self._panels = horizontal_layout(
-            self._rows, self._table, stretch=1, spacing=2 * GRID
+            self._rows, (self._table, SHARES[0]), stretch=1, spacing=2 * GRID
         )
         self._use_room()  # before the match: the order of the Tab key
-        self._panels.addWidget(self._match)
-        self._share_room()
+        self._panels.addWidget(self._match, SHARES[2])
         scroll = PageScroll()
         scroll.setWidget(self._content)
         vertical_layout(self, scroll)
@@ -165,15 +162,7 @@ class LedsPage(ResponsiveLayout, Page):
         if self._room.is_narrow:
             self._rows.addWidget(self._space)
         else:
-            self._panels.insertWidget(1, self._space)
-        self._share_room()
-
-    def _share_room(self) -> None:
-        """Divide the width; on a very large page the table gets its full width."""
-        shares = VERY_LARGE_SHARES if self._room.is_very_large else SHARES
-        panels = self._table, self._space, self._match
-        for panel, share in zip(panels, shares, strict=True):
-            self._panels.setStretchFactor(panel, share)
+            self._panels.insertWidget(1, self._space, SHARES[1])
 
     def _on_selection_changed(self) -> None:
         self._leds.follow_selection()

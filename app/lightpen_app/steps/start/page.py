@@ -10,7 +10,7 @@ from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.start.day_control import DayControl
-from lightpen_app.steps.start.day_view import DayView, LargeScreenPanel
+from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.library_control import (
@@ -36,7 +36,6 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
-    very_large_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
@@ -52,7 +51,6 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._welcome = WelcomeView(offers_trial=workbench.around.simulator is not None)
         self._begin = WelcomeControl(workbench, self._welcome, self)
         self._result = LastResultPanel(workbench.around.now, bool(verify))
-        self._large = LargeScreenPanel(workbench.run.logbook)
         self._views = QStackedWidget()
         self._all_limits = LimitsControl(workbench, self)
         self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
@@ -60,7 +58,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
             workbench, services, self._interrupted, lambda: self._entries.settle(), self
         )
         self._last = LastResultPresenter(
-            self._selection, workbench.run, self._tips, self._result, self._large
+            self._selection, workbench.run, self._tips, self._result
         )
         self._entries = EntryPresenter(
             self._selection, self._library, setup.names, setup.limits, setup.assumed
@@ -72,9 +70,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         bars = self._unknown_code, self._interrupted
         vertical_layout(self, *bars, (self._views, 1), spacing=2 * GRID)
         fill(self._day.side, self._result, 1)
-        content = QWidget()
-        vertical_layout(content, (self._day, 1), (self._large, 1))
-        for each in (content, setup, self._welcome):
+        for each in (self._day, setup, self._welcome):
             scroll = PageScroll()
             scroll.setWidget(each)
             self._views.addWidget(scroll)
@@ -213,8 +209,6 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._setup.set_narrow(is_narrow)
         self._welcome.set_narrow(is_narrow)
         self._result.set_room(self._room)
-        self._large.setVisible(self._room.is_very_large)
-        self._last.show_trend()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

@@ -23,7 +23,6 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, moment_text, shortened
-from lightpen_app.steps.start.day_view import LargeScreenPanel
 from lightpen_app.widgets.bars import Question, QuestionBar, WithdrawalBar
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import SizeClass
@@ -39,10 +38,9 @@ from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
-SIZES = (  # of age, words and figures, where there is little room, plenty, and more
+SIZES = (  # of age, words and figures, where there is little room, and plenty
     (TextSize.TITLE, TextSize.SMALL, TextSize.BODY),
     (TextSize.DISPLAY, TextSize.BODY, TextSize.TITLE),
-    (TextSize.HUGE, TextSize.LEAD, TextSize.DISPLAY),
 )
 
 
@@ -131,7 +129,7 @@ class LastResultPanel(Translated, QGroupBox):
 
     def set_room(self, room: SizeClass) -> None:
         """Scale its figures to the size of the window."""
-        age, words, figures = SIZES[room.is_large + room.is_very_large]
+        age, words, figures = SIZES[room.is_large]
         set_size(self._age, age)
         for label in (self._when, *self._heads):
             set_size(label, words)
@@ -310,7 +308,7 @@ def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
 
 
 class LastResultPresenter(QObject):
-    """Shows the last result in one panel, its swing in another."""
+    """Shows the last result of the selected tip."""
 
     verification_requested = Signal()  # verify the displayed tip
 
@@ -320,11 +318,10 @@ class LastResultPresenter(QObject):
         run: SwingRun,
         library: LibraryWatch,
         panel: LastResultPanel,
-        large: LargeScreenPanel,
     ) -> None:
         super().__init__(panel)
         self._selection, self._run, self._library = selection, run, library
-        self._panel, self._large = panel, large
+        self._panel = panel
         self._lookup = LatestJob(self)
 
         # Connections
@@ -340,20 +337,12 @@ class LastResultPresenter(QObject):
         """Read the current result."""
         self._look_up(lambda result: None)
 
-    def show_trend(self) -> None:
-        """Show the trend of the tip if there is room."""
-        pen, tip, is_simulated = _key(self._selection.preparation)
-        if not self._large.isHidden():
-            self._large.set_value(pen, tip, is_simulated=is_simulated)
-
     def shut_down(self) -> None:
         """Stop."""
-        self._large.shut_down()
         self._lookup.cancel()
 
     def _look_up(self, use: Callable[[Result | None], None]) -> None:
         self.shut_down()
-        self.show_trend()
         pen, tip, is_simulated = _key(self._selection.preparation)
         if not (pen and tip):
             self._panel.set_value(LastResult(is_named=False))

@@ -38,11 +38,6 @@ DIAL_SHARE, SIDE_SHARE = 2, 3  # of the width
 SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
-VERY_LARGE_SIDE_SHARES, VERY_LARGE_ROW_SHARES = (
-    (5, 0, 6),
-    (1, 1),
-)  # and where there is more
-PEN_PLACE = 3  # below the count, its bar and its note
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -54,7 +49,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
     large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
-    very_large_from = QSize(240 * GRID, 130 * GRID)  # px; then they are larger still
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -101,6 +95,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._side = grid_layout(self._body, at=(0, 1), spacing=2 * GRID)
         numbers = (self._count, self._progress, self._note, 1)
         self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
+        self._side.addWidget(self._pen, 0, 1)
         self._body.setRowStretch(0, 1)
         self._body.setColumnStretch(0, DIAL_SHARE)
         self._body.setColumnStretch(1, SIDE_SHARE)
@@ -180,10 +175,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
-        if self._room.is_very_large:
-            self._numbers.insertWidget(PEN_PLACE, self._pen, 100)
-        else:
-            self._side.addWidget(self._pen, 0, 1)
         self._share_room()
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
@@ -207,8 +198,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         columns, rows = SIDE_SHARES, ROW_SHARES
         if self._is_small:
             columns, rows = (*columns[:2], 0), (1, 0)
-        elif self._room.is_very_large:
-            columns, rows = VERY_LARGE_SIDE_SHARES, VERY_LARGE_ROW_SHARES
         elif self._room.is_large:
             columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
         for column, share in enumerate(columns):

@@ -49,7 +49,6 @@ from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel
-from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
@@ -584,30 +583,6 @@ def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
 
     assert small == (TextSize.TITLE, TextSize.BODY)
     assert large == (TextSize.DISPLAY, TextSize.TITLE)
-
-
-def test_a_vast_screen_shows_how_the_tip_developed(
-    show: Show, workbench: Workbench, qtbot: QtBot
-) -> None:
-    start = show(workbench)
-    start.page.show_day()
-    start.page.resize(1616, 870)
-    assert not shown_below(start)
-    start.page.resize(2300, 1250)
-
-    for days in (30, 12):
-        accepted(workbench, timedelta(days=days))
-    workbench.run.logbook.enter_owed()
-    start.page.entered()
-
-    qtbot.waitUntil(lambda: shown_below(start))
-    (trend,) = start.page.findChildren(TrendPanel)
-    assert len(trend.value().entries) == 2
-
-
-def shown_below(start: Opened) -> bool:
-    """Whether a vast page shows more below all that is needed."""
-    return any(each.isVisible() for each in start.page.findChildren(TrendPanel))
 
 
 def test_a_tip_that_was_to_be_checked_stays_amber_with_its_reason(
