@@ -195,7 +195,7 @@ class Wizard(QObject):
             self.workbench.selection,
         ):
             model.changed.connect(self._show_subject)
-        self.crash_hook.reported.connect(self.window.show_crash_report)
+        self.crash_hook.reported.connect(self._on_crash_reported)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         self.window.log_requested.connect(self._open_log)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
@@ -214,6 +214,19 @@ class Wizard(QObject):
         self.window.set_subject(
             subject_of(now, chosen, self.workbench.library.statuses)
         )
+
+    def _on_crash_reported(self, path: str) -> None:
+        """Report an internal error; path "" if no report was written."""
+        text = self.tr(
+            "An internal error occurred. The program can continue; all images are "
+            "saved. Please send this report to the developers: {0}"
+        ).format(path)
+        if not path:
+            text = self.tr(
+                "An internal error occurred. The program can continue; all images are "
+                "saved. No report was written: the disk is full or write-protected."
+            )
+        self.workbench.notifications.notify("crash", text)
 
     def _on_folder_fault_changed(self, fault: str) -> None:
         """Advise another data folder while this one cannot be written."""

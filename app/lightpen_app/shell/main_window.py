@@ -16,20 +16,16 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QCheckBox,
-    QFileDialog,
-    QLineEdit,
     QMainWindow,
-    QMessageBox,
     QWidget,
 )
 from typing_extensions import override
 
-from lightpen_app.crash import versions
 from lightpen_app.face import Service
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID, Tone
-from lightpen_app.shell.menus import About, HelpWindow, OptionsMenu
-from lightpen_app.shell.page_area import ActionBar, LastInput, PageArea
+from lightpen_app.shell.menus import HelpWindow, OptionsMenu, is_agreed_to_close
+from lightpen_app.shell.page_area import ActionBar, PageArea, focus_first
 from lightpen_app.shell.sidebar import (
     Sidebar,
     Status,
@@ -46,7 +42,7 @@ from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.page import MainAction, Page, step_titles
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.job import Notifications
-from lightpen_app.work.settings import Preferences, Settings, data_folder
+from lightpen_app.work.settings import Preferences, Settings
 from lightpen_resources import RESOURCES
 
 LEAST_SIZE = QSize(98 * GRID, 60 * GRID)  # fits 800 x 600, and 1280 x 800 at 150 %
@@ -103,7 +99,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._notifications = notifications
         self._now = 0
         self._asks = True
-        self._last_input = LastInput(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
@@ -117,7 +112,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._make_actions()
 
         # Layout
-        self.setCentralWidget(self._arranged())
+        central = QWidget()
+        layout = grid_layout(central, spacing=0)
+        layout.addWidget(self._sidebar, 0, 0, 2, 1)
+        layout.addWidget(self._area, 0, 1)
+        layout.addWidget(self._action_bar, 1, 1)
+        layout.setRowStretch(0, 1)
+        self.setCentralWidget(central)
 
         # Connections
         self._sidebar.step_chosen.connect(self._on_step_chosen)
@@ -127,12 +128,14 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._action_bar.main_pressed.connect(self._on_main_pressed)
         self._action_bar.back_pressed.connect(self.go_back)
         self._options.value_changed.connect(self._on_options_changed)
-        self._options.mute_action.toggled.connect(self._on_mute_toggled)
-        self._options.data_folder_chosen.connect(self._on_data_folder_asked)
-        self._options.about_chosen.connect(self._on_about_chosen)
-        self.operator_view.closed.connect(self._on_operator_view_closed)
+        self._options.said.connect(self._action_bar.set_status)
+        self._options.data_folder_chosen.connect(self._on_data_folder_chosen)
+        self._options.log_requested.connect(self.log_requested)
+        self.operator_view.closed.connect(
+            lambda: self._operator_action.setChecked(False)
+        )
         self.operator_view.advance_requested.connect(self._on_remote_advance)
-        self.operator_view.pause_requested.connect(self._on_pause_pressed)
+        self.operator_view.pause_requested.connect(self._pause)
         self._notice.value_changed.connect(self.operator_view.set_notice)
         notifications.raised.connect(self._notice.show_text)
         notifications.withdrawn.connect(self._notice.drop)
@@ -209,21 +212,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Show why the data folder cannot be written; an empty text ends it."""
         self._notice.set_unwritable(folder, fault)
 
-    def show_crash_report(self, path: str) -> None:
-        """Report an internal error; path "" if no report was written."""
-        if path:
-            text = self.tr(
-                "An internal error occurred. The program can continue; all images "
-                "are saved. Please send this report to the developers: {0}"
-            ).format(path)
-        else:
-            text = self.tr(
-                "An internal error occurred. The program can continue; all images "
-                "are saved. No report was written: the disk is full or "
-                "write-protected."
-            )
-        self._notifications.notify("crash", text)
-
     def close_unasked(self) -> None:
         """Close without a question, since nobody may be present."""
         self._asks = False
@@ -256,10 +244,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         )
         return tuple(filter(None, texts))
 
-    def is_seen(self) -> bool:
-        """Return whether it, or the operator view, is on a screen."""
-        return not self.isMinimized() or self.operator_view.isVisible()
-
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the keys that no control has taken."""
@@ -267,13 +251,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         if event.isAutoRepeat() and key in KEYS_THAT_LEAD_ON:
             return  # auto-repeat of a held key would run through all steps
         if key in ENTER_KEYS:
-            focused = QApplication.focusWidget()
-            if (
-                isinstance(focused, QAbstractButton)
-                and not isinstance(focused, QCheckBox)
-                and focused.isEnabled()
-            ):
-                focused.click()
+            button = _focused_button()
+            if button is not None and not isinstance(button, QCheckBox):
+                button.click()
             elif self.page().main_action().why_not:
                 self.page().show_missing_input()
             else:
@@ -283,7 +263,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         elif key == Qt.Key.Key_PageUp:
             self.go_back()
         elif key in ARROW_KEYS and self.page().hasFocus():  # after a click
-            self._focus_first(self.page())
+            if not focus_first(self.page()):
+                self._action_bar.focus_main()
             focused = QApplication.focusWidget()
             if focused is not None and focused is not self.page():
                 QApplication.sendEvent(focused, event)
@@ -292,8 +273,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
-        questions = [page.unsaved() for page in self._pages if page.unsaved()]
-        if self._asks and questions and not self._confirmed("\n\n".join(questions)):
+        question = "\n\n".join(filter(None, (page.unsaved() for page in self._pages)))
+        if self._asks and question and not is_agreed_to_close(self, question):
             event.ignore()
             return
         self._later = None
@@ -310,7 +291,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._last_input.follow(self.windowHandle())
+        self._area.last_input.follow(self.windowHandle())
 
     @override
     def changeEvent(self, event: QEvent) -> None:
@@ -346,7 +327,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page = next(self._later, None)
         if page is None:
             self._later = None
-            self._end_tab_order()
+            self._area.order_tabs(
+                *self._action_bar.findChildren(QAbstractButton),
+                *self._sidebar.findChildren(StepButton),
+            )
         else:
             self._add_page(page)
         self._refresh()
@@ -357,16 +341,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         while index >= len(self._pages) and self._make_page():
             pass
         return self._pages[index]
-
-    def _end_tab_order(self) -> None:
-        """Let the Tab key reach the main button after the pages, then the steps."""
-        last = self.previousInFocusChain() or self
-        while last.focusPolicy() is Qt.FocusPolicy.NoFocus:
-            last = last.previousInFocusChain() or self
-        buttons = self._action_bar.findChildren(QAbstractButton)
-        for each in (*buttons, *self._sidebar.findChildren(StepButton)):
-            self.setTabOrder(last, each)
-            last = each
 
     def _add_page(self, page: Page) -> None:
         self._pages.append(page)
@@ -382,7 +356,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self.show_step)
         page.operator_value_changed.connect(self.operator_view.set_value)
-        page.data_folder_requested.connect(self._on_data_folder_asked)
+        page.data_folder_requested.connect(self._options.ask_data_folder)
         page.discovery_requested.connect(self._on_discovery_asked)
 
     def _make_actions(self) -> None:
@@ -416,15 +390,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         action.triggered.connect(lambda _=False: slot())
         self.addAction(action)
         return action
-
-    def _arranged(self) -> QWidget:
-        central = QWidget()
-        layout = grid_layout(central, spacing=0)
-        layout.addWidget(self._sidebar, 0, 0, 2, 1)
-        layout.addWidget(self._area, 0, 1)
-        layout.addWidget(self._action_bar, 1, 1)
-        layout.setRowStretch(0, 1)
-        return central
 
     @override
     def _use_room(self) -> None:
@@ -463,41 +428,18 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return replace(action, why_not=self.tr("Answer the question first."))
 
     def _focus_page(self) -> None:
-        """Put the focus on the control that the page chose, or on its first one.
-
-        Who uses the mouse sees no frame, but where text can be typed at once.
-        """
-        page = self.page()
-        first = page.first_control()
-        if self._last_input.is_pointer and not isinstance(first, QLineEdit):
-            page.setFocus(Qt.FocusReason.OtherFocusReason)
-        else:
-            self._focus_first(page)
-
-    def _focus_first(self, page: Page) -> None:
-        first = page.first_control()
-        if first is not None:
-            first.setFocus(Qt.FocusReason.TabFocusReason)
-            return
-        widget = page.nextInFocusChain()
-        while widget is not None and page.isAncestorOf(widget):
-            takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
-            if takes_tab and widget.isEnabled() and widget.isVisibleTo(page):
-                widget.setFocus(Qt.FocusReason.TabFocusReason)
-                return
-            widget = widget.nextInFocusChain()
-        self._action_bar.focus_main()
+        if not self._area.focus_page(self.page()):
+            self._action_bar.focus_main()
 
     def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
         """Let the page set the focus after the focused widget was removed.
 
         Otherwise Qt focuses the next widget, such as a button that Enter then presses.
         """
-        if not isinstance(now, QAbstractButton) or now.window() is not self:
+        is_button_here = isinstance(now, QAbstractButton) and now.window() is self
+        if before is None or before.isVisible() or not is_button_here:
             return
-        if before is None or before.isVisible() or not self._area.isAncestorOf(before):
-            return
-        if self.page().isAncestorOf(before):
+        if self._area.isAncestorOf(before) and self.page().isAncestorOf(before):
             self._focus_page()
 
     def _on_discovery_asked(self) -> None:
@@ -545,13 +487,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""
-        focused = QApplication.focusWidget()
-        if isinstance(focused, QAbstractButton) and focused.isEnabled():
-            focused.click()
+        button = _focused_button()
+        if button is None:
+            self._pause()
         else:
-            self._on_pause_pressed()
+            button.click()
 
-    def _on_pause_pressed(self) -> None:
+    def _pause(self) -> None:
         self.page().toggle_pause()
 
     def _on_help_triggered(self) -> None:
@@ -568,55 +510,25 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _emit_attention(self) -> None:
         """Emit whether live images can be seen now."""
-        is_seen = self.is_seen()
+        is_seen = not self.isMinimized() or self.operator_view.isVisible()
         self.attention_changed.emit(self.page().shows_images and is_seen)
-
-    def _on_operator_view_closed(self) -> None:
-        self._operator_action.setChecked(False)
 
     def _on_options_changed(self, preferences: Preferences) -> None:
         self.operator_view.set_distance_m(preferences.distance_m)
         self.preferences_changed.emit(preferences)
 
-    def _on_mute_toggled(self, muted: bool) -> None:
-        words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
-        self._action_bar.set_status(words)
-
-    def _on_data_folder_asked(self) -> None:
-        dialog = QFileDialog(self, self.tr("Data folder"))
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        dialog.setDirectory(str(data_folder(self._options.value())))
-        dialog.fileSelected.connect(self._on_data_folder_chosen)
-        dialog.open()
-
-    def _on_data_folder_chosen(self, folder: str) -> None:
-        self._options.set_data_folder(folder)
-        words = self.tr(
-            "From the next start, swings and results are saved in {0}. Existing "
-            "ones remain in place."
-        )
-        self._notifications.notify(OPTIONS, words.format(folder), Tone.ACTIVE)
-
-    def _on_about_chosen(self) -> None:
-        about = About(versions(), self)
-        about.log_requested.connect(self.log_requested)
-        about.exec()
-
-    def _confirmed(self, question: str) -> bool:
-        box = QMessageBox(self)
-        box.setIcon(QMessageBox.Icon.Question)
-        box.setTextFormat(Qt.TextFormat.PlainText)
-        box.setText(question)
-        stay = box.addButton(self.tr("Keep open"), QMessageBox.ButtonRole.RejectRole)
-        box.addButton(self.tr("Close anyway"), QMessageBox.ButtonRole.AcceptRole)
-        box.setDefaultButton(stay)
-        box.setEscapeButton(stay)
-        box.exec()
-        return box.clickedButton() is not stay
+    def _on_data_folder_chosen(self, words: str) -> None:
+        self._notifications.notify(OPTIONS, words, Tone.ACTIVE)
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
         self._action_bar.set_status("")  # it is in the previous language
         self._show_remark()
+
+
+def _focused_button() -> QAbstractButton | None:
+    """Return the enabled button that has the focus."""
+    focused = QApplication.focusWidget()
+    if isinstance(focused, QAbstractButton) and focused.isEnabled():
+        return focused
+    return None

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtCore import QCoreApplication, Qt, QUrl, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -13,8 +13,17 @@ from PySide6.QtGui import (
     QTextDocument,
     QTextTable,
 )
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QMenu, QTextBrowser, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QMenu,
+    QMessageBox,
+    QTextBrowser,
+    QWidget,
+)
 
+from lightpen_app.crash import versions
 from lightpen_app.face import MenuEntry
 from lightpen_app.look.languages import own_name
 from lightpen_app.look.layouts import vertical_layout
@@ -22,7 +31,7 @@ from lightpen_app.look.theme import GRID, Appearance, TextSize, Tone, text_label
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.operator_view import DISTANCES_M
-from lightpen_app.work.settings import Preferences
+from lightpen_app.work.settings import Preferences, data_folder
 from lightpen_resources import RESOURCES, SOURCE_LANGUAGE, languages
 
 
@@ -30,8 +39,10 @@ class OptionsMenu(Translated, QMenu):
     """Shows and changes the preferences."""
 
     value_changed = Signal(object)  # Preferences: the user chose otherwise
-    data_folder_chosen = Signal()  # the user wants to keep swings and results elsewhere
-    about_chosen = Signal()  # show the description of the program
+    said = Signal(str)  # a sentence for the status line
+    # A sentence: swings and results are kept elsewhere from the next start on.
+    data_folder_chosen = Signal(str)
+    log_requested = Signal()  # open the folder of the log
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -64,9 +75,9 @@ class OptionsMenu(Translated, QMenu):
         self._about = self.say(self.addAction(""), self.tr("About Lightpen"))
 
         # Connections
-        self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
-        self._data_folder.triggered.connect(self.data_folder_chosen)
-        self._about.triggered.connect(self.about_chosen)
+        self.mute_action.toggled.connect(self._on_mute_toggled)
+        self._data_folder.triggered.connect(self.ask_data_folder)
+        self._about.triggered.connect(self._show_about)
 
         self._retranslate()
 
@@ -74,9 +85,15 @@ class OptionsMenu(Translated, QMenu):
         """Return the preferences in use."""
         return self._value
 
-    def set_data_folder(self, folder: str) -> None:
-        """Keep swings and results elsewhere, from the next start on."""
-        self._choose(data_folder=folder)
+    def ask_data_folder(self) -> None:
+        """Ask where swings and results are kept from the next start on."""
+        dialog = QFileDialog(self.parentWidget(), self.tr("Data folder"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(str(data_folder(self._value)))
+        dialog.fileSelected.connect(self._on_data_folder_chosen)
+        dialog.open()
 
     def add_entry(self, entry: MenuEntry, window: QWidget) -> None:
         """Add the entry of an extension."""
@@ -85,6 +102,25 @@ class OptionsMenu(Translated, QMenu):
         self.insertAction(self._about, action)
         self._entries.append((action, entry))
         self._retranslate()
+
+    def _on_data_folder_chosen(self, folder: str) -> None:
+        self._choose(data_folder=folder)
+        words = self.tr(
+            "From the next start, swings and results are saved in {0}. Existing "
+            "ones remain in place."
+        )
+        self.data_folder_chosen.emit(words.format(folder))
+
+    def _on_mute_toggled(self, muted: bool) -> None:
+        self._choose(muted=muted)
+        self.said.emit(
+            self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
+        )
+
+    def _show_about(self) -> None:
+        about = About(versions(), self.parentWidget())
+        about.log_requested.connect(self.log_requested)
+        about.exec()
 
     def _choice_menu(
         self, preference: str, choices: Sequence[object], chosen: object
@@ -125,6 +161,22 @@ class OptionsMenu(Translated, QMenu):
             action.setText(entry.text())
         for action, value in self._choices:
             action.setText(self._choice_name(value))
+
+
+def is_agreed_to_close(window: QWidget, question: str) -> bool:
+    """Ask whether to close a window although something is not saved."""
+    translate = QCoreApplication.translate
+    box = QMessageBox(window)
+    box.setIcon(QMessageBox.Icon.Question)
+    box.setTextFormat(Qt.TextFormat.PlainText)
+    box.setText(question)
+    roles = QMessageBox.ButtonRole
+    stay = box.addButton(translate("OptionsMenu", "Keep open"), roles.RejectRole)
+    box.addButton(translate("OptionsMenu", "Close anyway"), roles.AcceptRole)
+    box.setDefaultButton(stay)
+    box.setEscapeButton(stay)
+    box.exec()
+    return box.clickedButton() is not stay
 
 
 HELP = RESOURCES / "help"

@@ -4,7 +4,14 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QCoreApplication, QDeadlineTimer, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QWindow
-from PySide6.QtWidgets import QBoxLayout, QFrame, QSizePolicy, QStackedWidget, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFrame,
+    QLineEdit,
+    QSizePolicy,
+    QStackedWidget,
+    QWidget,
+)
 from typing_extensions import override
 
 from lightpen_app.look.layouts import announce, fill, horizontal_layout, vertical_layout
@@ -19,7 +26,7 @@ from lightpen_app.look.theme import (
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import SizeClass
-from lightpen_app.widgets.page import MainAction
+from lightpen_app.widgets.page import MainAction, Page
 
 
 class NoticeBar(Translated, QFrame):
@@ -106,6 +113,7 @@ class PageArea(QFrame):
     def __init__(self, page: QWidget) -> None:
         super().__init__()
         self.setObjectName("page_area")
+        self.last_input = LastInput(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self.notice = NoticeBar()
@@ -124,6 +132,27 @@ class PageArea(QFrame):
         )
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
+
+    def order_tabs(self, *after: QWidget) -> None:
+        """Let the Tab key reach these after the pages."""
+        window = self.window()
+        last = window.previousInFocusChain() or window
+        while last.focusPolicy() is Qt.FocusPolicy.NoFocus:
+            last = last.previousInFocusChain() or window
+        for each in after:
+            self.setTabOrder(last, each)
+            last = each
+
+    def focus_page(self, page: Page) -> bool:
+        """Focus the control that a page chose, or its first; False without any.
+
+        Who uses the mouse sees no frame, but where text can be typed at once.
+        """
+        is_typed = isinstance(page.first_control(), QLineEdit)
+        if not self.last_input.is_pointer or is_typed:
+            return focus_first(page)
+        page.setFocus(Qt.FocusReason.OtherFocusReason)
+        return True
 
     def words(self) -> tuple[str, ...]:
         """Return the texts about the page."""
@@ -160,6 +189,22 @@ class PageArea(QFrame):
             self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
             self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
             self._heading.setSpacing(GRID)
+
+
+def focus_first(page: Page) -> bool:
+    """Focus the control that a page chose, or its first; False without any."""
+    first = page.first_control()
+    if first is None:
+        widget = page.nextInFocusChain()
+        while widget is not None and page.isAncestorOf(widget):
+            takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
+            if takes_tab and widget.isEnabled() and widget.isVisibleTo(page):
+                first = widget
+                break
+            widget = widget.nextInFocusChain()
+    if first is not None:
+        first.setFocus(Qt.FocusReason.TabFocusReason)
+    return first is not None
 
 
 def _let_ask(page: QWidget, asks: bool) -> None:

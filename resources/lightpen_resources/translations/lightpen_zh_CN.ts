@@ -2625,44 +2625,12 @@
 <context>
     <name>MainWindow</name>
     <message>
-        <source>An internal error occurred. The program can continue; all images are saved. Please send this report to the developers: {0}</source>
-        <translation>发生内部错误。程序可继续运行；全部图像已保存。请将此报告发给开发者：{0}</translation>
-    </message>
-    <message>
-        <source>An internal error occurred. The program can continue; all images are saved. No report was written: the disk is full or write-protected.</source>
-        <translation>发生内部错误。程序可继续运行；全部图像已保存。无法写入报告：磁盘已满或没有写入权限。</translation>
-    </message>
-    <message>
         <source>Answer the question first.</source>
         <translation>请先回答问题。</translation>
     </message>
     <message>
         <source>Press this button at the computer.</source>
         <translation>请在计算机上按此按钮。</translation>
-    </message>
-    <message>
-        <source>Sounds are off.</source>
-        <translation>声音已关闭。</translation>
-    </message>
-    <message>
-        <source>Sounds are on.</source>
-        <translation>声音已打开。</translation>
-    </message>
-    <message>
-        <source>Data folder</source>
-        <translation>数据文件夹</translation>
-    </message>
-    <message>
-        <source>From the next start, swings and results are saved in {0}. Existing ones remain in place.</source>
-        <translation>从下次启动起，摆动记录和结果保存在 {0}。现有的仍留在原处。</translation>
-    </message>
-    <message>
-        <source>Keep open</source>
-        <translation>不关闭</translation>
-    </message>
-    <message>
-        <source>Close anyway</source>
-        <translation>仍然关闭</translation>
     </message>
     <message>
         <source>Pen tip calibration</source>
@@ -3102,6 +3070,30 @@
     <message>
         <source>About Lightpen</source>
         <translation>关于 Lightpen</translation>
+    </message>
+    <message>
+        <source>Data folder</source>
+        <translation>数据文件夹</translation>
+    </message>
+    <message>
+        <source>From the next start, swings and results are saved in {0}. Existing ones remain in place.</source>
+        <translation>从下次启动起，摆动记录和结果保存在 {0}。现有的仍留在原处。</translation>
+    </message>
+    <message>
+        <source>Sounds are off.</source>
+        <translation>声音已关闭。</translation>
+    </message>
+    <message>
+        <source>Sounds are on.</source>
+        <translation>声音已打开。</translation>
+    </message>
+    <message>
+        <source>Keep open</source>
+        <translation>不关闭</translation>
+    </message>
+    <message>
+        <source>Close anyway</source>
+        <translation>仍然关闭</translation>
     </message>
 </context>
 <context>
@@ -5486,6 +5478,14 @@ needed</source>
 </context>
 <context>
     <name>Wizard</name>
+    <message>
+        <source>An internal error occurred. The program can continue; all images are saved. Please send this report to the developers: {0}</source>
+        <translation>发生内部错误。程序可继续运行；全部图像已保存。请将此报告发给开发者：{0}</translation>
+    </message>
+    <message>
+        <source>An internal error occurred. The program can continue; all images are saved. No report was written: the disk is full or write-protected.</source>
+        <translation>发生内部错误。程序可继续运行；全部图像已保存。无法写入报告：磁盘已满或没有写入权限。</translation>
+    </message>
     <message>
         <source>The program is open in other windows using the same data folder, {0}. Results are shared.</source>
         <translation>其他程序窗口也在使用数据文件夹 {0}，结果共享。</translation>

@@ -614,24 +614,12 @@ def test_options_open_by_key_and_change_the_appearance(
     ]
 
 
-def test_a_crash_is_reported_in_a_sentence_with_the_place_of_the_report(
-    shell: Shell,
-) -> None:
-    shell.window.show_crash_report("/data/crash-1.txt")
-    (text,) = [each for each in shell.window.words() if "/data/crash-1.txt" in each]
-    assert "An internal error occurred." in text
-
-    shell.window.show_crash_report("")
-
-    assert any("An internal error occurred." in each for each in shell.window.words())
-
-
 def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None:
     shell.notifications.notify(shell.pages[0].key, "The file holds no LED.")
     shell.window.go_to(1)
     assert "The file holds no LED." not in shell.window.words()
 
-    shell.window.show_crash_report("/data/crash-1.txt")
+    shell.notifications.notify("crash", "See /data/crash-1.txt")
     shell.window.go_to(0)
 
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
