@@ -44,10 +44,7 @@ SMALL: Mapping[str, Any] = {
     "uncertainty": {
         "shares": [],
         "independent_noise_mm": None,
-        "blocks_mm": None,
-        "block_ratio": 1.0,
         "correlation_factor": 1.0,
-        "lag1_autocorrelation": 0.0,
         "led_sigma_mm": 0.0,
         "distance_repeatability": 1e-5,
         "halves_difference_mm": ZERO,
@@ -56,9 +53,6 @@ SMALL: Mapping[str, Any] = {
     "adjusted": {
         "intrinsics": dict.fromkeys(("fx", "fy", "cx", "cy"), PARAMETER),
         "intrinsics_uncertainty_assumed": False,
-        "scale_uncertainty_before": 1e-5,
-        "scale_uncertainty_assumed": False,
-        "temperature_uncertainty_assumed": False,
         "pen_growth": 0.0,
         "disc_diameter_mm": 10.0,
         "disc_diameter_by_areas_mm": None,
@@ -93,9 +87,6 @@ SMALL: Mapping[str, Any] = {
         "missing": [],
         "tilt_deg": [0.0, 1.0],
         "turn_deg": [0.0, 1.0],
-        "spread_deg": ZERO,
-        "spread_axes_pen": 3 * [ZERO],
-        "predicted_bound_mm": ZERO,
     },
     "leds": [
         {
@@ -106,7 +97,6 @@ SMALL: Mapping[str, Any] = {
             "mean_px": [0.0, 0.0],
             "displacement_mm": ZERO,
             "displaced": False,
-            "correction_mm": ZERO,
         }
     ],
     "inputs": {

@@ -59,12 +59,12 @@ from lightpen.estimation.contact.single_images import (
     without_field,
 )
 from lightpen.estimation.pivot.pivot import TwoStageFit, fit_two_stage, projection_bias
-from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.estimation.rigs.rig_poses import (
     RigPoses,
     TimeLag,
     find_initial_extrinsics,
     join_poses,
+    require_usual_rig,
 )
 from lightpen.estimation.uncertainty.budget import (
     Budget,
@@ -357,7 +357,7 @@ def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
     rig, pen, posed = inputs.rig, inputs.pen, single.posed
     reasons = single.reasons.copy()
     found = find_initial_extrinsics(rig, posed)
-    require_usual_rig(rig, found, pen, single.pixels, posed)
+    require_usual_rig(rig, found)
     reasons[found.apart] = Reason.OTHER_MOMENT
     used = reasons == Reason.NONE
     advice = single.observations[0].advice

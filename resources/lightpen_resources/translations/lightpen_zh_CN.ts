@@ -6188,6 +6188,10 @@ needed</source>
         <translation>磁盘是只读的。请选择其他文件夹。</translation>
     </message>
     <message>
+        <source>The file agrees with the images if it contains rig_from_cam, or if the images of two cameras are swapped. Give the images in the order of the cameras in the file; cam_from_rig is needed: for each camera transpose the rotation R and replace the translation t by -R^T t.</source>
+        <translation>若该文件给出的是 rig_from_cam，或两台相机的图像互换，则与图像一致。请按文件中相机的顺序给出图像；此处需要 cam_from_rig：请将每台相机的旋转 R 转置，并用 -R^T t 代替平移 t。</translation>
+    </message>
+    <message>
         <source>The file has {n_leds} LEDs.</source>
         <translation>文件有 {n_leds} 个 LED。</translation>
     </message>
@@ -8280,10 +8284,6 @@ needed</source>
         <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请触测缺少的点。</translation>
     </message>
     <message>
-        <source>The file agrees with the images if it contains rig_from_cam; cam_from_rig is needed. For each camera transpose the rotation R and replace the translation t by -R^T t.</source>
-        <translation>若该文件给出的是 rig_from_cam，则与图像一致；而此处需要 cam_from_rig。请将每台相机的旋转 R 转置，并用 -R^T t 代替平移 t。</translation>
-    </message>
-    <message>
         <source>The file agrees with the images if it contains the camera positions in the rig instead of the translations of cam_from_rig. Replace c by -R c.</source>
         <translation>若该文件给出的是相机在相机组中的位置，而不是 cam_from_rig 的平移，则与图像一致。请用 -R c 代替 c。</translation>
     </message>
@@ -8294,10 +8294,6 @@ needed</source>
     <message>
         <source>The file agrees with the images if its rotations are transposed. Write each matrix row by row, for multiplication with a column vector.</source>
         <translation>若将该文件中的旋转转置，则与图像一致。请按左乘列向量的形式逐行写出旋转矩阵。</translation>
-    </message>
-    <message>
-        <source>The file agrees with the images if those of {one} and {other} are swapped. Give the images in the order of the rig file, {names}.</source>
-        <translation>若将 {one} 与 {other} 的图像对调，则与图像一致：请按相机组文件中的顺序（{names}）给出图像。</translation>
     </message>
     <message>
         <source>The file {file} exists already. Give the export another name.</source>
@@ -9264,10 +9260,6 @@ needed</source>
         <translation>{value:.3g} µs</translation>
     </message>
     <message>
-        <source>{where} Check that the file matches the current camera positions, or calibrate the rig again.</source>
-        <translation>{where}请检查该文件是否对应这些相机当前的位置，或重新标定相机组。</translation>
-    </message>
-    <message>
         <source>{name} names the intrinsics file of {camera}: {fault}</source>
         <translation>{name} 所指定的相机 {camera} 的文件：{fault}</translation>
     </message>
@@ -9484,12 +9476,12 @@ needed</source>
         <translation>{usable}；求测头至少需要 {needed} 幅。{advice}</translation>
     </message>
     <message>
-        <source>{where} {cause}</source>
-        <translation>{where}{cause}</translation>
+        <source>{where} Check that the file matches the current camera positions and that the images are in the order of its cameras, or calibrate the rig again.</source>
+        <translation>{where}请检查该文件是否对应这些相机当前的位置，图像是否按其相机的顺序给出，或重新标定相机组。</translation>
     </message>
     <message>
-        <source>{where} {one} Or: {other}</source>
-        <translation>{where}{one}或者：{other}</translation>
+        <source>{where} {cause}</source>
+        <translation>{where}{cause}</translation>
     </message>
     <message>
         <source>{why}</source>

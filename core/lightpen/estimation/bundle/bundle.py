@@ -40,6 +40,9 @@ from lightpen.estimation.bundle.linearised import (
     CameraView,
     Eliminated,
     eliminate,
+    left_over,
+    n_eliminated,
+    own_step,
 )
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.unknowns import (
@@ -134,12 +137,6 @@ class Bundle:
     def scale(self) -> float:
         """Scale of the pen in the swing against its file, relative."""
         return float(self.values[self.layout.scale][0])
-
-    @property
-    def led_corrections(self) -> FloatArray:
-        """Corrections of the file's LEDs, the scale apart, (L, 3), mm."""
-        moves = self.unknowns.basis @ self.values[self.layout.leds]
-        return np.asarray(moves.reshape(-1, 3))
 
     @property
     def drift(self) -> float:
@@ -402,10 +399,10 @@ def _solve(
     covariance = inverse(information + prior + measured)
     values = covariance @ (right + unknowns.prior_right())
     step, shifts = unknowns.step(values - now.values)
-    own = _follow(eliminated, step, shifts)
-    residuals = _left_over(now.views, step, shifts, own)
+    own = own_step(eliminated, step, shifts)
+    residuals = left_over(now.views, step, shifts, own)
     n_fitted = float(np.sum(covariance * information))
-    n_fitted += _n_eliminated(eliminated, jitter, used)
+    n_fitted += n_eliminated(eliminated, jitter, used)
     squares = np.where(used[..., None], residuals, 0.0) ** 2
     n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
     sigma = max(float(np.sqrt(squares.sum() / n_free)), NOISE_FLOOR)
@@ -499,55 +496,3 @@ def _jitter_matrices(
 def _together(residuals: FloatArray) -> FloatArray:
     """Return residuals (N, C, L, 2) with the LEDs of all cameras in one row."""
     return residuals.reshape(len(residuals), -1, 2)
-
-
-def _follow(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArray:
-    """Return the step of each image's own unknowns, (N, q)."""
-    by_cone = each.turn_by_step[..., :N_CONE]
-    return np.asarray(
-        each.turn + each.turn_by_step @ step + np.einsum("nqk,nk->nq", by_cone, shifts)
-    )
-
-
-def _left_over(
-    views: tuple[CameraView, ...],
-    step: FloatArray,
-    shifts: FloatArray,
-    unknown: FloatArray,
-) -> FloatArray:
-    """Return the residuals after a step, (N, C, L, 2), px, seat and jitter removed."""
-    n_leds = views[0].residuals.shape[1]
-    by_led = step[-3 * n_leds :].reshape(n_leds, 3)
-    by_diameter = step[-3 * n_leds - 1]
-    cone = step[:N_CONE] + shifts
-    if unknown.shape[1] > N_TURN:
-        cone = cone + unknown[:, N_TURN:]
-    n_fields = views[0].fields.shape[-1]
-    by_fields = step[-3 * n_leds - 1 - n_fields : -3 * n_leds - 1]
-    row, left = N_CONE, []
-    for view in views:
-        own = step[row : row + view.own.shape[-1]]
-        row += len(own)
-        left.append(
-            view.residuals
-            - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
-            - np.einsum("nlik,nk->nli", view.cone, cone)
-            - view.own @ own
-            - view.fields @ by_fields
-            - view.diameter * by_diameter
-            - np.einsum("nlik,lk->nli", view.led, by_led)
-        )
-    return np.stack(left, axis=1)
-
-
-def _n_eliminated(
-    each: Eliminated, jitter: FloatArray | None, used: BoolArray
-) -> float:
-    """Return the effective number of eliminated unknowns."""
-    n_images = int(used.any(axis=(1, 2)).sum())
-    if jitter is None:
-        return float(N_TURN * n_images)
-    known = np.linalg.inv(jitter)
-    left = each.nuisance_covariance[:, N_TURN:, N_TURN:]
-    freedom = N_CONE - np.einsum("nij,ji->n", left, known)
-    return float(N_TURN * n_images + freedom.sum())

@@ -223,3 +223,53 @@ def eliminate(
         turn_by_step=-gain,
         nuisance_covariance=nuisance_covariance,
     )
+
+
+def own_step(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArray:
+    """Return the step of each image's own unknowns, (N, q)."""
+    by_cone = each.turn_by_step[..., :N_CONE]
+    return np.asarray(
+        each.turn + each.turn_by_step @ step + np.einsum("nqk,nk->nq", by_cone, shifts)
+    )
+
+
+def left_over(
+    views: tuple[CameraView, ...],
+    step: FloatArray,
+    shifts: FloatArray,
+    unknown: FloatArray,
+) -> FloatArray:
+    """Return the residuals after a step, (N, C, L, 2), px, seat and jitter removed."""
+    n_leds = views[0].residuals.shape[1]
+    by_led = step[-3 * n_leds :].reshape(n_leds, 3)
+    by_diameter = step[-3 * n_leds - 1]
+    cone = step[:N_CONE] + shifts
+    if unknown.shape[1] > N_TURN:
+        cone = cone + unknown[:, N_TURN:]
+    n_fields = views[0].fields.shape[-1]
+    by_fields = step[-3 * n_leds - 1 - n_fields : -3 * n_leds - 1]
+    row, left = N_CONE, []
+    for view in views:
+        own = step[row : row + view.own.shape[-1]]
+        row += len(own)
+        left.append(
+            view.residuals
+            - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
+            - np.einsum("nlik,nk->nli", view.cone, cone)
+            - view.own @ own
+            - view.fields @ by_fields
+            - view.diameter * by_diameter
+            - np.einsum("nlik,lk->nli", view.led, by_led)
+        )
+    return np.stack(left, axis=1)
+
+
+def n_eliminated(each: Eliminated, jitter: FloatArray | None, used: BoolArray) -> float:
+    """Return the effective number of eliminated unknowns."""
+    n_images = int(used.any(axis=(1, 2)).sum())
+    if jitter is None:
+        return float(N_TURN * n_images)
+    known = np.linalg.inv(jitter)
+    left = each.nuisance_covariance[:, N_TURN:, N_TURN:]
+    freedom = N_CONE - np.einsum("nij,ji->n", left, known)
+    return float(N_TURN * n_images + freedom.sum())

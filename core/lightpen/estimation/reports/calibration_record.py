@@ -120,12 +120,6 @@ class UncertaintyRecord(Struct, frozen=True):
         Contribution of noise if no two images were correlated, k = 1.
     correlation_factor
         Ratio of the noise variance to that of independent images.
-    lag1_autocorrelation
-        Correlation of neighbouring images.
-    blocks_mm
-        Contribution of noise from the scatter of blocks of consecutive images, k = 1.
-    block_ratio
-        Variance between these blocks over that of independent noise and seat jitter.
     led_sigma_mm
         Standard deviation of the errors of the LED file, estimated from the images.
     distance_repeatability
@@ -137,10 +131,7 @@ class UncertaintyRecord(Struct, frozen=True):
 
     shares: tuple[ContributionRecord, ...]
     independent_noise_mm: Triple | None
-    blocks_mm: Triple | None
-    block_ratio: Number
     correlation_factor: float
-    lag1_autocorrelation: Number
     led_sigma_mm: Number
     distance_repeatability: float
     halves_difference_mm: Triple
@@ -197,9 +188,6 @@ class AdjustmentRecord(Struct, frozen=True):
 
     intrinsics: dict[str, AdjustedParameter]
     intrinsics_uncertainty_assumed: bool
-    scale_uncertainty_before: Number
-    scale_uncertainty_assumed: bool
-    temperature_uncertainty_assumed: bool
     pen_growth: Number
     disc_diameter_mm: Number
     disc_diameter_by_areas_mm: Estimate | None
@@ -316,9 +304,6 @@ class CoverageRecord(Struct, frozen=True):
     missing: tuple[str, ...]
     tilt_deg: Pair
     turn_deg: Pair
-    spread_deg: Triple
-    spread_axes_pen: tuple[Triple, Triple, Triple]
-    predicted_bound_mm: Triple
 
 
 class LedRecord(Struct, frozen=True):
@@ -331,7 +316,6 @@ class LedRecord(Struct, frozen=True):
     mean_px: Pair
     displacement_mm: Triple
     displaced: bool
-    correction_mm: Triple
 
 
 class CameraPlace(Struct, frozen=True, omit_defaults=True):
@@ -352,7 +336,6 @@ class CameraRecord(Struct, frozen=True):
 
     name: str
     images: ImageCounts
-    moments_without_image: Count
     rms_px: Number
     intrinsics: dict[str, AdjustedParameter]
     intrinsics_uncertainty_assumed: bool

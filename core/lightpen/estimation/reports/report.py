@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import structs
 
-from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.estimation.calibrate import Calibration, CameraImages
@@ -163,9 +162,7 @@ def _method(calibration: Calibration, name: Method) -> MethodRecord:
 
 def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
     budget, halves = reported(calibration).budget, calibration.halves
-
-    def std(covariance: FloatArray | None) -> FloatArray | None:
-        return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
+    noise = np.sqrt(np.diag(budget.independent_noise)[:3])
 
     return UncertaintyRecord(
         shares=tuple(
@@ -177,11 +174,8 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
             )
             for share in budget.shares
         ),
-        independent_noise_mm=plain(std(budget.independent_noise)),
-        blocks_mm=plain(std(budget.blocks)),
-        block_ratio=plain(budget.block_ratio),
+        independent_noise_mm=plain(noise),
         correlation_factor=plain(budget.correlation_factor),
-        lag1_autocorrelation=plain(budget.autocorrelation),
         led_sigma_mm=plain(calibration.led_sigma),
         distance_repeatability=distance_repeatability(
             calibration.bundle, calibration.budget, calibration.priors
@@ -197,11 +191,6 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
     return AdjustmentRecord(
         intrinsics=adjusted_intrinsics(calibration, 0),
         intrinsics_uncertainty_assumed=priors.cameras[0].assumed,
-        scale_uncertainty_before=plain(
-            np.sqrt(calibration.stated.scale.covariance[0, 0])
-        ),
-        scale_uncertainty_assumed=priors.scale.assumed,
-        temperature_uncertainty_assumed=priors.temperature.assumed,
         pen_growth=plain(calibration.growth),
         disc_diameter_mm=plain(calibration.bundle.state.pen.diameter),
         disc_diameter_by_areas_mm=(
@@ -273,7 +262,6 @@ def _instrument(instrument: Instrument) -> InstrumentRecord:
 
 def _coverage(calibration: Calibration) -> CoverageRecord:
     coverage = calibration.coverage
-    bound = np.sqrt(np.diag(calibration.budget.independent_noise)[:3])
     return CoverageRecord(
         directions=DIRECTION_NAMES,
         leaning=plain(coverage.counts[0]),
@@ -282,9 +270,6 @@ def _coverage(calibration: Calibration) -> CoverageRecord:
         missing=tuple(coverage.missing),
         tilt_deg=plain(np.degrees([coverage.tilts.min(), coverage.tilts.max()])),
         turn_deg=plain(np.degrees([coverage.turns.min(), coverage.turns.max()])),
-        spread_deg=plain(np.degrees(coverage.spread)),
-        spread_axes_pen=plain(coverage.axes),
-        predicted_bound_mm=plain(bound),
     )
 
 
@@ -299,7 +284,6 @@ def _leds(calibration: Calibration) -> tuple[LedRecord, ...]:
             mean_px=plain(leds.mean[j]),
             displacement_mm=plain(leds.displacement[j]),
             displaced=j + 1 in leds.displaced,
-            correction_mm=plain(calibration.bundle.led_corrections[j]),
         )
         for j in range(len(leds.rms))
     )
@@ -382,7 +366,6 @@ def _rig(calibration: Calibration) -> RigRecord:
                     used=int(images.used.sum()),
                     dropped=count_dropped(images.reasons),
                 ),
-                moments_without_image=images.reasons.count(Reason.ABSENT),
                 rms_px=plain(images.total_rms),
                 intrinsics=adjusted_intrinsics(calibration, c),
                 intrinsics_uncertainty_assumed=calibration.priors.cameras[c].assumed,

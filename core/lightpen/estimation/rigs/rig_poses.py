@@ -1,7 +1,8 @@
 """The pose of the pen at each moment by all cameras of a rig that saw it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from lightpen.detection.pose import Poses
 from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.single_images import PosedImages
 from lightpen.estimation.pivot.pivot import median_distance
+from lightpen.messages import Message, message
 from lightpen.model.rigid import (
     Rig,
     nearest_rotation,
@@ -320,3 +322,136 @@ def find_initial_extrinsics(
         rig, rotations=rotations, translations=translations, covariance=None
     )
     return InitialExtrinsics(placed, tuple(lags[1:]), apart)
+
+
+# Detection of other conventions in a rig file: directions, units.
+#
+# The extrinsics are known by the images alone. A file that contradicts them grossly is
+# refused, with the usual mistake that explains it. Smaller deviations are left to the
+# adjustment.
+
+
+USUAL_ANGLE = np.radians(5.0)  # by which a camera may have been bumped
+USUAL_SHARE = 0.1  # of its distance from the reference
+LEAST_DISTANCE = 100.0  # mm, lower bound of the distance for that share
+MISTAKEN = 0.4  # of these, left once a mistake is corrected
+FAR_OFF = 3.0  # times these: no rig to start from
+UNITS = (
+    (message("unit.metres"), 1000.0),
+    (message("unit.inches"), 25.4),
+    (message("unit.centimetres"), 10.0),
+    (message("unit.micrometres"), 0.001),
+)
+
+
+class _Places(NamedTuple):
+    """Rotations (C, 3, 3) and translations (C, 3) of cam_from_rig, mm."""
+
+    rotations: FloatArray
+    translations: FloatArray
+
+
+@dataclass(frozen=True)
+class _RigMistake:
+    """A usual mistake: how it is undone, and its message."""
+
+    undo: Callable[[_Places], _Places]
+    description: Message
+
+
+class _Distance(NamedTuple):
+    """Deviation of stated extrinsics from those by the images."""
+
+    camera: int
+    angle: float  # rad
+    length: float  # mm
+    size: float  # the larger of both relative to the usual deviation
+
+
+def require_usual_rig(rig: Rig, placed: InitialExtrinsics) -> None:
+    """Raise `CalibrationError` if cameras are quite elsewhere than in the rig's file.
+
+    It says what the file looks like, and what is needed.
+    """
+    stated = _Places(rig.rotations, rig.translations)
+    found = _Places(placed.rig.rotations, placed.rig.translations)
+    as_read = _distance(stated, found)
+    if as_read.size <= 1:
+        return
+    where = message(
+        "rig.elsewhere",
+        camera=rig.names[as_read.camera],
+        angle=float(np.degrees(as_read.angle)),
+        distance=as_read.length,
+    )
+    mistake = min(_MISTAKES, key=lambda each: _distance(each.undo(stated), found).size)
+    if _distance(mistake.undo(stated), found).size <= MISTAKEN:
+        raise CalibrationError("rig.mistaken", where=where, cause=mistake.description)
+    if as_read.size > FAR_OFF:
+        raise CalibrationError("rig.of-others", where=where)
+
+
+def _distance(stated: _Places, found: _Places) -> _Distance:
+    """Return the deviation of the camera that is farthest from its stated place."""
+    turns = stated.rotations @ np.swapaxes(found.rotations, 1, 2)
+    angles = np.linalg.norm(vector_from_rotation(turns), axis=1)
+    lengths = np.linalg.norm(stated.translations - found.translations, axis=1)
+    apart = np.linalg.norm(found.translations, axis=1)
+    shares = lengths / np.maximum(apart, LEAST_DISTANCE)
+    sizes = np.maximum(angles / USUAL_ANGLE, shares / USUAL_SHARE)
+    c = int(np.argmax(sizes))
+    return _Distance(c, float(angles[c]), float(lengths[c]), float(sizes[c]))
+
+
+def _as_read(places: _Places) -> _Places:
+    return places
+
+
+def _transposed(places: _Places) -> _Places:
+    return places._replace(rotations=np.swapaxes(places.rotations, 1, 2))
+
+
+def _from_position(places: _Places) -> _Places:
+    return places._replace(
+        translations=-np.einsum("cij,cj->ci", places.rotations, places.translations)
+    )
+
+
+def _inverted(places: _Places) -> _Places:
+    return _from_position(_transposed(places))
+
+
+def _scaled(
+    undo: Callable[[_Places], _Places], factor: float, places: _Places
+) -> _Places:
+    undone = undo(places)
+    return undone._replace(translations=factor * undone.translations)
+
+
+_DIRECTIONS = (
+    _RigMistake(_inverted, message("rig.inverted")),
+    _RigMistake(_transposed, message("rig.transposed")),
+    _RigMistake(_from_position, message("rig.position")),
+)
+
+
+def _in_unit(unit: Message) -> Message:
+    return message("rig.unit", unit=unit)
+
+
+def _in_unit_too(mistake: _RigMistake, unit: Message) -> Message:
+    return message("rig.direction-and-unit", direction=mistake.description, unit=unit)
+
+
+_MISTAKES = (
+    *_DIRECTIONS,
+    *(
+        _RigMistake(partial(_scaled, _as_read, factor), _in_unit(unit))
+        for unit, factor in UNITS
+    ),
+    *(
+        _RigMistake(partial(_scaled, each.undo, factor), _in_unit_too(each, unit))
+        for each in _DIRECTIONS
+        for unit, factor in UNITS
+    ),
+)

@@ -218,7 +218,6 @@ def test_the_record_holds_each_share_of_the_uncertainty() -> None:
     assert assumed == ["ball and cone"]  # no file states it
     assert np.shape(found["independent_noise_mm"]) == (3,)
     assert "rig" not in names  # one camera has none
-    assert np.shape(found["blocks_mm"]) == (3,)
 
 
 def test_the_record_holds_what_the_images_made_of_the_camera_and_the_discs() -> None:
