@@ -1,7 +1,6 @@
 """Tests of the commands about cameras: intrinsics, extrinsics, board, check-camera."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -115,48 +114,6 @@ def test_the_rig_file_of_two_cameras_is_read_back(
     sigmas = np.sqrt(np.diag(rig.covariance))[3:]
     assert np.all(np.abs(rig.translations[1] - SHIFT) < 4 * sigmas)
     assert "Baseline" in capsys.readouterr().out
-
-
-def test_a_swing_says_whether_file_and_camera_agree(
-    scene: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    swing = scene("--binning", "2", "--images", "40", "--seed", "8")
-    record_file = tmp_path / "record.json"
-    status = run(
-        *("check-camera", swing, "--camera", swing / "camera.yaml"),
-        *("--pen", swing / "leds.csv", "--json", record_file),
-    )
-
-    assert status == 0
-    assert "File and camera agree" in capsys.readouterr().out
-    assert json.loads(record_file.read_text())["agrees"] is True
-
-
-@pytest.mark.slow
-def test_a_file_of_another_focus_is_contradicted_by_a_swing(
-    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    swing = shared_data / "swing-clean"
-    text = (swing / "camera.yaml").read_text().replace("4638.2", "4598.2")
-    text = text.replace("4638.1999999999998", "4598.2").replace(
-        "4637.1000000000004", "4597.1"
-    )
-    text = text.replace(" 1031.3", " 1051.3")
-    deviations = "0.5, 0.5, 0.6, 0.6, 4e-4, 4e-3, 4e-5, 4e-5, 0.0"
-    (tmp_path / "camera.yaml").write_text(
-        f"{text}\nstd_deviations_intrinsics: [{deviations}]\n"
-    )
-    status = run(
-        *("check-camera", swing, "--camera", tmp_path / "camera.yaml"),
-        *("--pen", swing / "leds.csv"),
-    )
-
-    assert status == 1
-    printed = capsys.readouterr()
-    assert "intrinsics file: focal length" in printed.err  # the worst of them
-    assert "intrinsics file: principal point cy" in printed.out
-    fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
-    assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)
 
 
 def test_images_that_are_binned_use_a_camera_file_that_is_written(

@@ -89,17 +89,19 @@ def test_the_circle_of_the_paper_has_its_radius(
 
 
 @pytest.mark.slow
-def test_table_1_is_reproduced_from_led_centres_by_one_command(
-    shared_data: Path, lightpen: Run, tmp_path: Path
+def test_table_1_is_reproduced_from_results(
+    shared_data: Path,
+    calibration_of: Callable[..., Path],
+    lightpen: Run,
+    tmp_path: Path,
 ) -> None:
     folder = shared_data / "repeat"
-    tables = sorted(folder.glob("calib_*.csv"))[:4]
+    results = [
+        calibration_of(folder, "--centers", str(table)) / "calibration.json"
+        for table in sorted(folder.glob("calib_*.csv"))[:4]
+    ]
 
-    outcome = lightpen(
-        *("repeatability", *tables),
-        *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
-        *("--json", tmp_path / "repeat.json"),
-    )
+    outcome = lightpen("repeatability", *results, "--json", tmp_path / "repeat.json")
 
     assert outcome.returncode == 0, outcome.stderr
     lines = outcome.stdout.splitlines()
@@ -332,17 +334,6 @@ def test_files_that_are_missing_or_would_be_lost_are_named(
     assert "--pen FILE is missing" in without_pen.stderr
     assert "would replace the input file" in over_tip.stderr
     assert "is not a calibration record." in no_tip.stderr
-
-
-def test_results_and_led_centres_are_not_mixed(
-    shared_data: Path, lightpen: Run, tip: Path
-) -> None:
-    folder = shared_data / "repeat"
-
-    outcome = lightpen("repeatability", tip, folder / "calib_01.csv")
-
-    assert outcome.returncode == 2
-    assert "Give either results or files of LED centres" in outcome.stderr
 
 
 @pytest.mark.slow

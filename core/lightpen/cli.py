@@ -44,7 +44,6 @@ COMMANDS = (
     ("repeatability", "repeatability", "compare calibrations of one tip"),
     ("recalculate", "recalculate", "recompute calibrations and check U by Monte Carlo"),
     ("improve-pen", "pen_health", "improve the LED file from several swings"),
-    ("check-camera", "check_camera", "check the intrinsics file with a swing"),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")

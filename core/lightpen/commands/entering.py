@@ -38,7 +38,7 @@ def add_entering(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_in_force(
-    options: argparse.Namespace, tip: CalibrationFile | None
+    options: argparse.Namespace, tip: CalibrationFile
 ) -> VerificationLimits:
     """Return the limits of a verification that is entered in a data folder.
 
@@ -49,8 +49,7 @@ def limits_in_force(
     supervision = None if data is None else read_supervision(data)
     if supervision is None or not supervision.is_guarded:
         return replace(VerificationLimits(), **chosen)
-    station = (Names() if tip is None else tip.names).station
-    own = supervision.limits_at(station, StationLimits()).verification
+    own = supervision.limits_at(tip.names.station, StationLimits()).verification
     limits = replace(own, **chosen)
     wider = [
         each.name
@@ -76,29 +75,28 @@ def limits_in_force(
 def keep_record(
     options: argparse.Namespace,
     record: Mapping[str, Any],
-    tip: CalibrationFile | None,
+    tip: CalibrationFile,
     origin: Origin | None = None,
 ) -> None:
     """Write a verification as JSON where requested, and enter it in the archive.
 
-    That is in the data folder of the tip; None of LED centres alone. By default the
-    origin of the images is taken from the tip.
+    That is in the data folder of the tip. By default the origin of the images is taken
+    from the tip.
     """
-    names = Names() if tip is None else tip.names
-    own = None if tip is None else tip.origin
-    is_simulated = Origin.SIMULATED in (origin, own)
+    names = tip.names
+    is_simulated = Origin.SIMULATED in (origin, tip.origin)
     if is_simulated:
         origin = Origin.SIMULATED
     operator = record.get("operator")  # of recorded images
     if operator:
         names = replace(names, operator=operator)
-    record = attributed(record, names, origin or own)
+    record = attributed(record, names, origin or tip.origin)
     if options.json is not None:
         write_record(options.json, record)
     data = _data_of_entry(options, tip)
     if data is None:
         print("This result is not entered in an archive.")
-        folder = None if tip is None else data_folder_of(tip.path)
+        folder = data_folder_of(tip.path)
         if folder is not None and not is_simulated:
             _print_overdue(folder, names)
         return
@@ -114,13 +112,11 @@ def keep_record(
     print(shown(f"Entered in the archive: {kept}"))
 
 
-def _data_of_entry(
-    options: argparse.Namespace, tip: CalibrationFile | None
-) -> Path | None:
+def _data_of_entry(options: argparse.Namespace, tip: CalibrationFile) -> Path | None:
     """Return the data folder in which a result is entered; None of one that is not."""
     if getattr(options, "no_entry", True):
         return None
-    return options.data or (None if tip is None else data_folder_of(tip.path))
+    return options.data or data_folder_of(tip.path)
 
 
 def _print_overdue(data: Path, names: Names) -> None:

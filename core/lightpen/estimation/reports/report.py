@@ -189,7 +189,7 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
     """Return the adjusted values of the files."""
     priors, reading = calibration.priors, calibration.priors.reading
     return AdjustmentRecord(
-        intrinsics=adjusted_intrinsics(calibration, 0),
+        intrinsics=_adjusted_intrinsics(calibration, 0),
         intrinsics_uncertainty_assumed=priors.cameras[0].assumed,
         pen_growth=plain(calibration.growth),
         disc_diameter_mm=plain(calibration.bundle.state.pen.diameter),
@@ -338,7 +338,7 @@ def _frames_of(images: CameraImages) -> Iterator[FrameRecord]:
         )
 
 
-def adjusted_intrinsics(
+def _adjusted_intrinsics(
     calibration: Calibration, c: int
 ) -> dict[str, AdjustedParameter]:
     """Return the adjusted intrinsics of the c-th camera."""
@@ -367,7 +367,7 @@ def _rig(calibration: Calibration) -> RigRecord:
                     dropped=count_dropped(images.reasons),
                 ),
                 rms_px=plain(images.total_rms),
-                intrinsics=adjusted_intrinsics(calibration, c),
+                intrinsics=_adjusted_intrinsics(calibration, c),
                 intrinsics_uncertainty_assumed=calibration.priors.cameras[c].assumed,
                 cam_from_rig=_camera_place(calibration, c),
             )
