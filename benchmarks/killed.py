@@ -25,7 +25,7 @@ from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.reading import Record, open_record
+from lightpen.record.swings.reading import Record, image_name, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
@@ -144,8 +144,8 @@ def _on_disk(record: Record) -> Acknowledged:
     return {
         (record.folder.name, image.number)
         for image in open_record(record.folder).images
-        if image.file.is_file()
-        and sha256(image.file.read_bytes()).hexdigest() == image.sha256
+        for file in [record.folder / image_name(image.number)]
+        if file.is_file() and sha256(file.read_bytes()).hexdigest() == image.sha256
     }
 
 

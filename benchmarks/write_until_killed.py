@@ -18,6 +18,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import numpy as np
 from benchmarks.hostile_records import IMAGE, NAMES
 from msgspec import structs
 
@@ -28,7 +29,7 @@ from lightpen.formats.pen_files import PEN_FILE
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import FileCopy
-from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.reading import RecordedImage, open_record
 from lightpen.record.swings.solving import source
 from lightpen.record.swings.writing import (
     RecordWriter,
@@ -59,10 +60,14 @@ def swing(data: Path) -> None:
         folder = make_record_folder(data / RECORDS, NAMES, datetime.now(UTC))
         with RecordWriter.create(folder, header) as writer:
             for image in model.images[:3]:
-                number = writer.append(
-                    IMAGE, image.pixels, image.rotation, image.translation, image.time
-                )
+                number = append(writer, image)
                 tell(folder.name, number)
+
+
+def append(writer: RecordWriter, image: RecordedImage) -> int:
+    """Record an image again."""
+    pose = np.array(image.rotation), np.array(image.translation)
+    return writer.append(IMAGE, image.rig_pixels[0], *pose, image.time)
 
 
 def resume(data: Path) -> None:
@@ -72,9 +77,7 @@ def resume(data: Path) -> None:
         record = open_record(folder)
         image = record.images[0]
         with RecordWriter.resume(record) as writer:
-            number = writer.append(
-                IMAGE, image.pixels, image.rotation, image.translation, image.time
-            )
+            number = append(writer, image)
             tell(folder.name, number)
 
 

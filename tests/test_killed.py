@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.reading import Record, is_record, open_record
+from lightpen.record.swings.reading import Record, image_name, is_record, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
@@ -179,7 +179,10 @@ def assert_whole(record: Record) -> None:
     numbers = [image.number for image in record.images]
     assert numbers == list(range(1, len(numbers) + 1))
     for image in record.images:
-        assert sha256(image.file.read_bytes()).hexdigest() == image.sha256
+        assert (
+            sha256((record.folder / image_name(image.number)).read_bytes()).hexdigest()
+            == image.sha256
+        )
 
 
 @pytest.mark.slow

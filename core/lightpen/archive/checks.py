@@ -46,7 +46,7 @@ from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.reading import (
     JOURNAL,
-    ImageLine,
+    RecordedImage,
     image_name,
     journal_bytes,
     open_record,
@@ -169,7 +169,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
         return
     folder = Path(journal.place).parent.as_posix()
     for line in lines:
-        if isinstance(line, ImageLine):
+        if isinstance(line, RecordedImage):
             digests = [line.sha256, *(other.sha256 for other in line.others)]
             for c, digest in enumerate(digests):
                 yield FileHash(f"{folder}/{image_name(line.number, c)}", digest)

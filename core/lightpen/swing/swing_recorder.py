@@ -433,7 +433,7 @@ def read_for_more(folder: Path) -> Resumable:
 def _shows(record: Record, pen: Pen, rig: Rig) -> bool:
     """Return whether the journal can be of this pen before these cameras."""
     for image in record.images:
-        R, t = image.rotation, image.translation
+        R, t = np.array(image.rotation), np.array(image.translation)
         if image.rig_pixels.shape[:2] != (rig.n_cameras, pen.n_leds):
             return False
         if not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=ROUNDING):

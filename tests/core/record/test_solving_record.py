@@ -152,7 +152,7 @@ def test_a_record_without_images_says_what_to_do(folder: Path) -> None:
 
 def test_a_record_without_one_readable_image_is_refused(folder: Path) -> None:
     for image in open_record(folder).images:
-        image.file.write_bytes(b"no image")
+        (folder / image_name(image.number)).write_bytes(b"no image")
     with pytest.raises(FileError, match="None of the 20 images can be read"):
         solve_record(open_record(folder))
 

@@ -29,7 +29,7 @@ the journal spare reading the images when an interrupted swing continues.
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -86,21 +86,29 @@ class SecondaryImage(Struct):
     pixels: tuple[tuple[Length, Length] | None, ...]
 
 
-class ImageLine(Struct, tag_field="kind", tag="image", omit_defaults=True):
-    """An image was acknowledged; see `lightpen.record.swings.reading.RecordedImage`."""
+class RecordedImage(
+    Struct, tag_field="kind", tag="image", omit_defaults=True, frozen=True
+):
+    """An acknowledged image, by its line."""
 
     number: Number
     sha256: Digest
-    time: float
+    time: float  # s, by the clock of the session that took it
     device_time_ns: int | None
-    pixels: tuple[tuple[Length, Length] | None, ...]
-    rotation: tuple[Row, Row, Row]
-    translation: Vector
+    pixels: tuple[tuple[Length, Length] | None, ...]  # ellipse centres of LEDs, px
+    rotation: tuple[Row, Row, Row]  # cam_from_pen
+    translation: Vector  # cam_from_pen, mm
     camera: Stats | None = None  # since the swing began
-    others: tuple[SecondaryImage, ...] = ()
-    touch: Count = 0  # of a verification, from 1
-    run: Count = 0  # likewise: of a feature or visit, from 1
-    approach: tuple[Entry, Entry, Entry] | None = None
+    others: tuple[SecondaryImage, ...] = ()  # simultaneous images of a rig
+    touch: Count = 0  # number of the touch in a verification, from 1; 0 in a swing
+    run: Count = 0  # likewise of its feature or visit
+    approach: tuple[Entry, Entry, Entry] | None = None  # way of the tip to the point
+
+    @property
+    def rig_pixels(self) -> FloatArray:
+        """Centres by all cameras, (C, L, 2), px; NaN where an LED was not seen."""
+        views = (self.pixels, *(each.pixels for each in self.others))
+        return np.stack([_points(each) for each in views])
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):
@@ -129,7 +137,7 @@ class MoreLine(Struct, tag_field="kind", tag="more"):
     max_images: Number
 
 
-Line: TypeAlias = ImageLine | OutLine | ExcludedLine | VerdictLine | MoreLine
+Line: TypeAlias = RecordedImage | OutLine | ExcludedLine | VerdictLine | MoreLine
 
 
 def line_bytes(line: Line) -> bytes:
@@ -208,7 +216,7 @@ def last_verdict(folder: Path) -> str | None:
             return None
         if isinstance(last, VerdictLine):
             return last.verdict
-        if isinstance(last, ImageLine):
+        if isinstance(last, RecordedImage):
             return None
     return None
 
@@ -231,30 +239,6 @@ IMAGES = "images"
 OPENER = "swing.lightpen"  # by its suffix the system knows the program
 DISCARDED = "discarded"
 PRESS_TEST = "press_test"  # among the settings: made to be compared with another
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedImage:
-    """An acknowledged image."""
-
-    number: int
-    file: Path
-    sha256: str
-    time: float  # s, by the clock of the session that took it
-    device_time_ns: int | None
-    pixels: FloatArray  # (L, 2), ellipse centres of LEDs, px; NaN if not seen
-    rotation: FloatArray  # (3, 3), cam_from_pen, mm
-    translation: FloatArray  # (3,), cam_from_pen, mm
-    stats: Stats = field(default_factory=Stats)  # since the swing began
-    others: tuple[SecondaryImage, ...] = ()  # simultaneous images of a rig
-    touch: int = 0  # number of the touch in a verification, from 1; 0 in a swing
-    run: int = 0  # likewise of its feature or visit
-    approach_cam: FloatArray | None = None  # (3,), way of the tip to the point
-
-    @property
-    def rig_pixels(self) -> FloatArray:
-        """Centres by all cameras, (C, L, 2), px; NaN where an LED was not seen."""
-        return np.stack([self.pixels, *(_points(each.pixels) for each in self.others)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +278,7 @@ class Record:
     @property
     def stats(self) -> Stats:
         """Return the camera counters up to the last accepted image."""
-        return self.images[-1].stats if self.images else Stats()
+        return (self.images[-1].camera if self.images else None) or Stats()
 
     @property
     def next_number(self) -> int:
@@ -311,10 +295,10 @@ def open_record(folder: Path) -> Record:
     header = read_header(folder)
     lines = read_lines(folder)
     parsed = parse_lines(lines, folder)
-    n_leds = next((len(x.pixels) for x in parsed if isinstance(x, ImageLine)), 0)
+    n_leds = next((len(x.pixels) for x in parsed if isinstance(x, RecordedImage)), 0)
     last = 0
     for number, line in enumerate(parsed, start=1):
-        if isinstance(line, ImageLine):
+        if isinstance(line, RecordedImage):
             others = (len(other.pixels) for other in line.others)
             n_seen = [len(line.pixels), *others]
             is_whole = n_seen == header.n_cameras * [n_leds]
@@ -331,8 +315,8 @@ def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) ->
     verdict, more = None, None
     for line in lines:
         match line:
-            case ImageLine():
-                images.append(_recorded_image(folder, line))
+            case RecordedImage():
+                images.append(line)
                 verdict = None
             case OutLine():
                 excluded.update(dict.fromkeys(line.numbers, line.reason))
@@ -395,24 +379,6 @@ def images_folder(c: int) -> str:
 def image_name(number: int, c: int = 0) -> str:
     """Return the image file of the c-th camera, relative to the record."""
     return f"{images_folder(c)}/{number:06d}.png"
-
-
-def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
-    return RecordedImage(
-        number=line.number,
-        file=folder / image_name(line.number),
-        sha256=line.sha256,
-        time=line.time,
-        device_time_ns=line.device_time_ns,
-        pixels=_points(line.pixels),
-        rotation=np.array(line.rotation, dtype=np.float64),
-        translation=np.array(line.translation, dtype=np.float64),
-        stats=line.camera or Stats(),
-        others=line.others,
-        touch=line.touch,
-        run=line.run,
-        approach_cam=None if line.approach is None else np.array(line.approach),
-    )
 
 
 def _points(pixels: Sequence[tuple[float, float] | None]) -> FloatArray:

@@ -32,11 +32,11 @@ from lightpen.record.swings.reading import (
     JOURNAL,
     OPENER,
     ExcludedLine,
-    ImageLine,
     Line,
     MoreLine,
     OutLine,
     Record,
+    RecordedImage,
     SecondaryImage,
     VerdictLine,
     image_name,
@@ -217,7 +217,7 @@ class RecordWriter:
             for c, other in enumerate(others, start=1)
         )
         self._write_line(
-            ImageLine(
+            RecordedImage(
                 number=number,
                 sha256=digest,
                 time=time,

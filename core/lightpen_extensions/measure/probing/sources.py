@@ -166,17 +166,21 @@ def held_in(record: Record) -> tuple[tuple[int, StillFrames], ...]:
         if image.touch:
             by_point.setdefault(image.touch, []).append(image)
     return tuple(
-        (own[0].run, StillFrames(tuple(map(_frame, own)), (), own[0].approach_cam))
+        (own[0].run, StillFrames(tuple(map(_frame, own)), (), _approach(own[0])))
         for own in by_point.values()
     )
+
+
+def _approach(image: RecordedImage) -> FloatArray | None:
+    return None if image.approach is None else np.array(image.approach)
 
 
 def _frame(image: RecordedImage) -> ProbingFrame:
     return ProbingFrame(
         point_image_name(image.number),
         image.rig_pixels,
-        image.rotation,
-        image.translation,
+        np.array(image.rotation),
+        np.array(image.translation),
     )
 
 

@@ -566,7 +566,8 @@ def test_images_captured_after_the_acceptance_are_offered(case: Case) -> None:
     first = record.images[0]
     with RecordWriter.resume(record) as writer:
         image = load_image(case.solution, 1)
-        writer.append(image, first.pixels, first.rotation, first.translation, 9.0)
+        pose = np.array(first.rotation), np.array(first.translation)
+        writer.append(image, first.rig_pixels[0], *pose, 9.0)
 
     assert case.offered() == ["swing"]
 

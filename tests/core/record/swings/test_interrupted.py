@@ -24,6 +24,7 @@ from lightpen.record.swings.reading import (
     DISCARDED,
     JOURNAL,
     VerdictLine,
+    image_name,
     line_bytes,
     open_record,
 )
@@ -227,7 +228,9 @@ def test_a_discarded_swing_is_not_offered_again_and_keeps_its_images(
     assert names_found(tmp_path) == []
     record = open_record(tmp_path / "a")
     assert record.verdict == DISCARDED
-    assert all(image.file.is_file() for image in record.images)
+    assert all(
+        (record.folder / image_name(image.number)).is_file() for image in record.images
+    )
 
 
 def test_a_damaged_swing_cannot_go_on(preparation: Preparation, tmp_path: Path) -> None:

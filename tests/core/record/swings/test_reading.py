@@ -92,7 +92,7 @@ def test_all_that_was_recorded_is_read_back_to_the_last_digit(
     assert [image.number for image in record.images] == [1, 2, 3]
     pixels = np.random.default_rng(2).uniform(0, 60, (10, 2))
     pixels[3] = np.nan
-    np.testing.assert_array_equal(record.images[2].pixels, pixels)
+    np.testing.assert_array_equal(record.images[2].rig_pixels[0], pixels)
     np.testing.assert_array_equal(record.images[2].rotation, np.eye(3) / 3)
     np.testing.assert_array_equal(record.images[2].translation, np.ones(3) / 7)
     for seed, load in enumerate(source(record).images.open()):
@@ -166,7 +166,7 @@ def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
     for image, load in zip(record.images, source(record).images.open(), strict=True):
         np.testing.assert_array_equal(load(), dark_image(image.number))
         np.testing.assert_array_equal(
-            image.pixels, np.full((10, 2), image.number + 0.1)
+            image.rig_pixels[0], np.full((10, 2), image.number + 0.1)
         )
     assert find_unfinished(tmp_path).interrupted[0].folder == folder
 
