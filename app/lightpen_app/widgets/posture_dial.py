@@ -98,14 +98,6 @@ def place_of(posture: Posture, heading: float) -> tuple[float, float]:
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
-def posture_at(place: tuple[float, float], turn: float, heading: float) -> Posture:
-    """Return the posture that `place_of` draws at a place; ``turn`` in rad."""
-    x, y = place
-    tilt = float(np.interp(math.hypot(x, y), (0.0, *RING_EDGES), TILTS))
-    direction = (math.atan2(y, x) - heading) % (2 * math.pi)
-    return Posture(tilt, direction, turn)
-
-
 class PostureDial(Translated, QWidget):
     """Two rings of eight directions, a middle, and a bar for the turn."""
 
@@ -176,6 +168,10 @@ class PostureDial(Translated, QWidget):
             painter.drawPath(outline)
         self._draw_posture(painter, middle, rim, colors)
         self._draw_turn(painter, bar, colors)
+        if self.hasFocus():
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(colors.accent), 2))
+            painter.drawEllipse(middle, 1.02 * rim, 1.02 * rim)
 
     def _drawn_ground(self, colors: Colors) -> QPixmap:
         """Return a picture of camera and fields; only changed ones are drawn anew."""

@@ -40,9 +40,6 @@ class Operator(Protocol):
     def hold(self) -> None:
         """Hold the pen still."""
 
-    def lean(self, tilt: float, direction: float, turn: float) -> None:
-        """Follow the mouse to a posture, angles in rad."""
-
     def slip(self, distance: float, seconds: float) -> None:
         """Let the tip slip out of the cone by a distance, mm, for some seconds."""
 

@@ -132,7 +132,6 @@ SLIP_TIME = 0.05  # s that a slip takes
 
 GUIDED = TrackingMotion(gain=3.0, lag=0.13, top_speed=np.radians(30))
 SWUNG = TrackingMotion(gain=5.0, lag=0.078, top_speed=np.radians(60))
-MOUSE = TrackingMotion(gain=12.0, lag=0.0325, top_speed=np.radians(360))
 ARM = TrackingMotion(gain=4.0, lag=0.0975, top_speed=300.0)
 
 
@@ -280,10 +279,6 @@ class Operator:
         """Tilt the pen to a posture, angles in rad, with human dynamics."""
         goal = lean_vectors(tilt, direction, turn)
         self._wish(partial(self._aim, goal, GUIDED), delay=REACTION)
-
-    def lean(self, tilt: float, direction: float, turn: float) -> None:
-        """Follow the mouse to a posture, angles in rad."""
-        self._wish(partial(self._aim, lean_vectors(tilt, direction, turn), MOUSE))
 
     def slip(self, distance: float, seconds: float) -> None:
         """Let the tip slip out of the cone by a distance, mm, for some seconds."""

@@ -2021,13 +2021,6 @@
     </message>
 </context>
 <context>
-    <name>LeaningDial</name>
-    <message>
-        <source>Drag or use the arrow keys to tilt the simulated pen. Wheel or keys , and . turn it about its own axis.</source>
-        <translation>拖动或用方向键倾斜模拟光笔。滚轮或 , 和 . 键使其绕自身轴线转动。</translation>
-    </message>
-</context>
-<context>
     <name>LedFileControl</name>
     <message>
         <source>Discard changes</source>
@@ -2967,21 +2960,6 @@
     <message>
         <source>Ball diameter</source>
         <translation>测球直径</translation>
-    </message>
-</context>
-<context>
-    <name>NextTipsRow</name>
-    <message>
-        <source>Next tip</source>
-        <translation>下一个测头</translation>
-    </message>
-    <message>
-        <source>Next tip {0}</source>
-        <translation>下一个测头 {0}</translation>
-    </message>
-    <message>
-        <source>Calibrate tip {0} next with its ball diameter and nominal centre</source>
-        <translation>接着标定测头 {0}，采用其测球直径和标称中心</translation>
     </message>
 </context>
 <context>
@@ -4798,6 +4776,10 @@ needed</source>
         <translation>模拟操作员还能用光笔做的动作</translation>
     </message>
     <message>
+        <source>Seats the tip in the cone</source>
+        <translation>将测头放入锥孔</translation>
+    </message>
+    <message>
         <source>Simulated swing</source>
         <translation>模拟摆动</translation>
     </message>
@@ -4812,10 +4794,6 @@ needed</source>
     <message>
         <source>Lets the tip slip by {0} mm for a moment</source>
         <translation>让测头短暂滑动 {0} mm</translation>
-    </message>
-    <message>
-        <source>Seats the tip in the cone; then drag the dot of the dial</source>
-        <translation>将测头放入锥孔，然后拖动姿态盘上的圆点</translation>
     </message>
     <message>
         <source>Swings the pen about the cone regardless of the arrow</source>
@@ -4916,10 +4894,6 @@ needed</source>
         <translation>已接受</translation>
     </message>
     <message>
-        <source>Let the simulated operator swing; or choose Seat under Other movements and tilt the pen by dragging the dial.</source>
-        <translation>让模拟操作员摆动；或在“其他动作”中选“就位”，然后在姿态盘上拖动使光笔倾斜。</translation>
-    </message>
-    <message>
         <source>Done</source>
         <translation>完成</translation>
     </message>
@@ -4970,6 +4944,10 @@ needed</source>
     <message>
         <source>Computing the tip</source>
         <translation>正在计算测头</translation>
+    </message>
+    <message>
+        <source>Let the simulated operator swing.</source>
+        <translation>请让模拟操作员摆动。</translation>
     </message>
     <message>
         <source>Press test: press the tip firmly into the cone.</source>

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -267,3 +267,12 @@ def reds(image: QImage) -> FloatArray:
     rgb = image.convertToFormat(QImage.Format.Format_RGB888)
     rows = np.frombuffer(rgb.constBits(), np.uint8).reshape(rgb.height(), -1)
     return rows[:, : 3 * rgb.width() : 3].astype(float)
+
+
+def test_the_focus_is_seen(qtbot: QtBot, dial: PostureDial) -> None:
+    dial.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    dial.activateWindow()
+    dial.setFocus()
+    qtbot.waitUntil(dial.hasFocus)
+
+    assert color_at(seen(dial), 1.02, 0.0) == DARK.accent

@@ -64,7 +64,7 @@ def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
     live.start()
     try:
         station.wait_for_phase(Phase.VERDICT)
-        station.operator.lean(0.0, 0.0, 0.0)
+        station.operator.lean_towards(0.0, 0.0, 0.0)
         station.wait_until(lambda: SwingEventKind.CONFIRMED in witness.event_kinds)
     finally:
         live.stop()

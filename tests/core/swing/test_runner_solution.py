@@ -242,11 +242,11 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
     solved: "Station",
 ) -> None:
     solved.see(3)  # until the hand has done what it was guided to last
-    solved.operator.lean(0.4, 0.0, 0.0)
+    solved.operator.lean_towards(0.4, 0.0, 0.0)
     solved.see(35)
     assert SwingEventKind.CONFIRMED not in solved.witness.event_kinds
 
-    solved.operator.lean(0.0, 0.0, 0.0)
+    solved.operator.lean_towards(0.0, 0.0, 0.0)
     solved.see_until(lambda: SwingEventKind.CONFIRMED in solved.witness.event_kinds)
     assert stillness(solved.state) == 1.0
     solved.see(10)

@@ -17,7 +17,6 @@ from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.review.acceptance import AcceptanceControl, PressTestControl
-from lightpen_app.steps.review.next_tips import NextTipsControl
 from lightpen_app.steps.review.result_export import ResultExport
 from lightpen_app.steps.review.result_panel import reviewed_result
 from lightpen_app.steps.review.view import ReviewView
@@ -62,9 +61,6 @@ class ReviewPage(Page):
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
         self._painted: SwingAssessment | None = None  # since it is shown
-        self._next = NextTipsControl(
-            self._selection, self._run, workbench.library, view.next_tips
-        )
         self._acceptance = AcceptanceControl(self._selection, self._run, view)
         self._press = PressTestControl(
             *(self._run, view, workbench.library, workbench.notifications),
@@ -180,7 +176,6 @@ class ReviewPage(Page):
 
     @override
     def shut_down(self) -> None:
-        self._next.shut_down()
         self._press.shut_down()
         self._along.shut_down()
         self._view.tabs.shut_down()
@@ -192,7 +187,6 @@ class ReviewPage(Page):
             return  # during capture, the status changes twenty times a second
         self._shown = now
         if now.result is not before.result:
-            self._next.follow(now.result)
             self._accepted.start(2 * QApplication.doubleClickInterval())
         if (now.result, now.assessment) != (before.result, before.assessment):
             self._view.end_questions()

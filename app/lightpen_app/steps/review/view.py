@@ -15,7 +15,6 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
-from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.result_export import ResultTools
 from lightpen_app.steps.review.result_panel import (
     ResultPanel,
@@ -205,7 +204,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             ),
         )
         self.tools = ResultTools(export_formats(services))
-        self.next_tips = NextTipsRow()
         self.tabs = self.say(DetailTabs(run, place), self.tr("Details"))
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
@@ -219,7 +217,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         fill(others, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
         self._box = layout = vertical_layout(self, self._banner, self.question)
         fill(layout, self.reason, self.withdrawal, self.solving, self._messages)
-        fill(layout, (self.tabs, 1), self.next_tips)
+        fill(layout, (self.tabs, 1))
         self.tabs.insertTab(0, self._scroll, "")
         self.tabs.setCurrentIndex(0)
         self._use_room()

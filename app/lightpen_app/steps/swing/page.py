@@ -76,8 +76,6 @@ class SwingPage(Page):
         self._view.side.clicked.connect(self._on_act_clicked)
         self._view.start_over.clicked.connect(self._on_start_over_clicked)
         self._view.swapped.clicked.connect(self._on_swapped_clicked)
-        self._view.dial.leaned.connect(self._simulator.lean)
-        self._simulator.led_by_itself.connect(self._view.dial.forget_target)
         self._showing.timeout.connect(self._show)
         self._plotting.timeout.connect(self._plot)
 
@@ -178,7 +176,6 @@ class SwingPage(Page):
             self._view.dial.setFocus()  # Enter would run an action that was not shown
         if not any(each.is_here for each in self._services):
             self.operator_value_changed.emit(now.operator_value)
-        self._view.dial.set_interactive(self._live.operator is not None)
         if now.has_fault and not before.has_fault:
             self._sounds.play(Sound.LOST)
         if now.is_capturing is not before.is_capturing:

@@ -15,7 +15,6 @@ from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_l
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, MICROMETRES
 from lightpen_app.steps.swing.page_state import SwingPageState, side_text
-from lightpen_app.steps.swing.simulator_controls import LeaningDial
 from lightpen_app.widgets.controls import LazyWidget, PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
@@ -31,6 +30,7 @@ from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.pen_in_space import PenInSpace
 from lightpen_app.widgets.plots import Curve, TracePlot
+from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.state_banner import SignLabel, StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 
@@ -72,7 +72,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._warning = SignLabel()
         self._verdict = StateBanner(TextSize.DISPLAY)
         self._verdict.setMinimumHeight(10 * GRID)
-        self.dial = LeaningDial()
+        self.dial = PostureDial()
+        self.dial.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # no button has it then
         # As high as its place is; it draws itself as large as it can.
         self.dial.setSizePolicy(
             QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored

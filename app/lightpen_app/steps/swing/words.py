@@ -192,10 +192,7 @@ class SwingWords(QObject):
         if message.code == Code.SOLVING and view.setup.is_recording:
             return Instruction(instruction.short, self.tr("Computing the tip"))
         if message.code == Code.SHOW_PEN and view.is_simulated:
-            hint = self.tr(
-                "Let the simulated operator swing; or choose Seat under Other "
-                "movements and tilt the pen by dragging the dial."
-            )
+            hint = self.tr("Let the simulated operator swing.")
             return Instruction(instruction.short, hint)
         if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
             instruction = lean_phrase(state.target, view.posture, heading)

@@ -46,13 +46,7 @@ from lightpen.record.library.supervision import (
     Supervision,
     require_supervisor,
 )
-from lightpen.record.library.tip_library import (
-    KIND_WORDS,
-    SWUNG,
-    ItemKind,
-    Library,
-    ListedTip,
-)
+from lightpen.record.library.tip_library import KIND_WORDS, SWUNG, ItemKind, Library
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.header import Names
@@ -345,46 +339,3 @@ def _require_same_images(record: Record, solution: Solution) -> None:
     is_same = record.all_numbers.tolist() == solution.numbers.tolist()
     if not is_same or set(record.excluded) != set(solution.excluded):
         raise FileError("acceptance.changed", folder=record.folder)
-
-
-MOST = 4  # tips that a pen has in use, as a rule
-
-
-@dataclass(frozen=True, eq=False)
-class NextTip:
-    """A tip to be calibrated next: its last result with the pen, its entry, if any."""
-
-    pen: str
-    tip: str
-    last: Result | None
-    listed: ListedTip | None
-
-
-def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
-    """Return the other tips of a pen: current ones, the oldest first, then others.
-
-    Those of the library that were never calibrated with the pen follow, unless it is a
-    simulated one. Retired tips are left out; results that cannot be read are passed
-    over.
-    """
-    pen, is_simulated = present.names.pen, present.is_simulated
-    library, found = Library(), list[NextTip]()
-    with suppress(FileError):
-        library = archive.library()
-    with suppress(FileError):
-        known = archive.tips(pen, is_simulated=is_simulated)
-        tips = [tip for tip in known if tip != present.names.tip]
-        for tip in [tip for tip in tips if not library.has_retired(tip)][:MOST]:
-            with suppress(FileError):
-                last = archive.in_force(pen, tip, is_simulated=is_simulated)
-                if last is not None:
-                    found.append(NextTip(pen, tip, last, library.tip(tip)))
-        if not is_simulated:
-            new = [tip for tip in library.tips if tip not in known]
-            found = [
-                *(NextTip(pen, tip, None, library.tips[tip]) for tip in reversed(new)),
-                *found,
-            ]
-    others = [each for each in found if each.tip != present.names.tip]
-    in_use = [each for each in others if not library.has_retired(each.tip)]
-    return tuple(reversed(in_use))[:MOST]

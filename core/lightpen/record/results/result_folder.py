@@ -132,19 +132,6 @@ class FolderArchive:
                 return file
         return None
 
-    def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
-        """Return the tips of a pen with a current result, the newest first.
-
-        Results that cannot be read are passed over.
-        """
-        root = self._root(is_simulated)
-        found = [
-            heading.tip
-            for _, heading in self._unrevoked(root, passes_over_damage=True)
-            if heading.pen is not None and _may_be(heading.pen, pen)
-        ]
-        return tuple(filter(None, dict.fromkeys(found)))
-
     def files_of_pen(self, pen: str, *, is_simulated: bool = False) -> tuple[Path, ...]:
         """Return the results of a pen that are not revoked, the newest first."""
         root = self._root(is_simulated)

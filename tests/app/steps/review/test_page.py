@@ -65,7 +65,6 @@ from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.steps.review.image_table import STATE, ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
-from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
@@ -752,46 +751,6 @@ def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
     names = workbench.selection.preparation.names
     archive = workbench.run.archive
     assert archive.in_force(names.pen, names.tip, is_simulated=True) is not None
-
-
-def test_the_next_tip_is_one_click_away_with_its_ball_and_nominal_centre(
-    bed: Bed,
-) -> None:
-    workbench = bed.solve()
-    last = replace(workbench.run.status.names, tip="T-11", ball_diameter=5.0)
-    nominal = [1.0, -80.0, -20.0]
-    put_in_force(workbench, tip(workbench), names=last, nominal_tip_mm=nominal)
-    page = bed.show()
-    page.run_main_action()
-    bed.qtbot.waitUntil(page.is_complete)
-    row = the(page, NextTipsRow)
-    bed.qtbot.waitUntil(lambda: bool(row.value()))
-    with bed.qtbot.waitSignal(page.step_requested) as asked:
-        click(page, "T-11")
-
-    now = workbench.selection.preparation
-    assert asked.args == ["swing"]
-    assert (now.names.tip, now.names.ball_diameter) == ("T-11", 5.0)
-    assert now.nominal_tip is not None
-    assert now.nominal_tip.tolist() == [1.0, -80.0, -20.0]
-
-
-def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) -> None:
-    workbench = bed.solve()
-    listed = ListedTip(id="T-12", ball_diameter_mm=3.0)
-    for each in (listed, ListedTip(id="T-13", is_retired=True)):
-        add_item(workbench.folder, each, Author(), THEN)
-    page = bed.show()
-    page.run_main_action()
-    bed.qtbot.waitUntil(page.is_complete)
-    row = the(page, NextTipsRow)
-    bed.qtbot.waitUntil(lambda: bool(row.value()))
-    assert [each.tip for each in row.value()] == ["T-12"]
-    with bed.qtbot.waitSignal(page.step_requested):
-        click(page, "T-12")
-
-    names = workbench.selection.preparation.names
-    assert (names.tip, names.ball_diameter) == ("T-12", 3.0)
 
 
 def test_the_tip_as_found_is_reported_against_its_limit(bed: Bed) -> None:

@@ -29,7 +29,6 @@ from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.swing.page import SwingPage
-from lightpen_app.steps.swing.simulator_controls import LeaningDial
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.plots import TracePlot
@@ -317,24 +316,6 @@ def test_enter_presses_the_filled_button_before_there_is_an_image(
     until(qtbot, lambda: desk.state.n_kept > 0)
 
 
-def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> None:
-    desk.window.go_to(1)
-    until(qtbot, lambda: "choose Seat" in desk.value.hint)
-    desk.choose("Seat")
-    until(qtbot, lambda: desk.value.instruction == "Tilt RIGHT")
-    until(qtbot, lambda: desk.state.was_upright)
-    dial = desk.page.findChild(LeaningDial)
-    assert isinstance(dial, LeaningDial)
-
-    dial.setFocus()
-    for _ in range(10):
-        QTest.keyClick(dial, Key.Key_Right)
-
-    until(qtbot, lambda: desk.state.heading is not None)
-    assert np.cos(desk.state.heading or 0.0) > 0.7  # the hand trembles
-    until(qtbot, lambda: (desk.posture or UPRIGHT).tilt > 0.2)
-
-
 # A short swing, from beginning to end
 
 
@@ -370,7 +351,7 @@ def test_a_pen_that_leans_after_the_verdict_waits(
     qtbot: QtBot, at_verdict: Desk
 ) -> None:
     desk = at_verdict
-    desk.operator.lean(0.4, 0.0, 0.0)
+    desk.operator.lean_towards(0.4, 0.0, 0.0)
     until(qtbot, lambda: desk.value.state.fraction is None)
     qtbot.wait(1000)  # four seconds of the operator's
 
@@ -382,7 +363,7 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_shows_the_review(
 ) -> None:
     desk = at_verdict
     desk.choose("Hold")
-    desk.operator.lean(0.0, 0.0, 0.0)
+    desk.operator.lean_towards(0.0, 0.0, 0.0)
 
     until(qtbot, lambda: desk.window.page().key == "review")
     filled = [value.state.fraction for value in desk.shown if value.state.fraction]

@@ -136,7 +136,9 @@ def test_an_operator_who_was_asked_for_something_is_free_no_more() -> None:
 
 def test_a_pen_that_is_away_shows_no_led_in_the_image() -> None:
     scene = Scene()
-    scene.operator.lean(MAX_TILT, np.pi, 0)  # to the side from which it is in longest
+    scene.operator.lean_towards(
+        MAX_TILT, np.pi, 0
+    )  # to the side from which it is in longest
     scene.watch(2)
     scene.operator.leave()
     held = scene.watch(6)[-1]
@@ -187,11 +189,6 @@ def test_the_last_guidance_counts() -> None:
 
     expected = [0.4 * np.cos(4.0), 0.4 * np.sin(4.0), 0.1]
     np.testing.assert_allclose(lean, expected, atol=SHAKE)
-
-
-def test_the_pen_follows_the_mouse_at_once() -> None:
-    seen = seen_after(lambda operator: operator.lean(0.5, np.pi / 2, -0.3), 0.6)
-    np.testing.assert_allclose(leans(seen)[-1], [0, 0.5, -0.3], atol=SHAKE)
 
 
 def test_the_swing_is_that_of_the_simulator() -> None:

@@ -478,17 +478,6 @@ def test_only_what_is_in_force_can_be_taken_back(case: Case) -> None:
     assert case.in_force().record == case.folder
 
 
-def test_the_tips_of_a_pen_are_known_by_their_results(case: Case) -> None:
-    other = replace(case.names, tip="T-20")
-    case.archive.store(replace(case.in_force(), names=other))
-    case.archive.store(
-        replace(case.in_force(), names=replace(other, tip="T-30", pen="LP-05"))
-    )
-
-    assert case.archive.tips(case.names.pen) == ("T-20", case.names.tip)
-    assert case.archive.tips(case.names.pen, is_simulated=True) == ()
-
-
 def _passing(case: Case) -> Solution:
     """Put the swing's own tip in force, and let the pen have leant to all sides."""
     calibration = case.solution.calibration
