@@ -26,14 +26,22 @@ def test_a_tip_is_added_changed_retired_and_listed(
     where = ("--data", tmp_path / "data", "--operator", "Ann")
     tip = ("tip", "T-10", *where)
     added = lightpen(
-        *("tips", "add", *tip, "--ball-diameter", "10", "--nominal", "0", "1.5"),
-        *("-150", "--max-change", "0.02", "--max-days", "7"),
+        *(
+            "tips",
+            "add",
+            *tip,
+            "--set",
+            "ball_diameter_mm=10",
+            "nominal_tip_mm=0 1.5 -150",
+        ),
+        *("max_change_mm=0.02", "max_days=7"),
     )
     assert added.stdout == "tip  T-10  10 mm  not calibrated\n", added.stderr
 
-    lightpen("tips", "change", *tip, "--max-change", "none", "--due", "2031-05-01")
-    lightpen("tips", "add", "cone", "C-1", *where, "--note", "by the door")
-    lightpen("tips", "retire", "cone", "C-1", *where, "--reason", "chipped")
+    lightpen("tips", "change", *tip, "--set", "max_change_mm=", "due=2031-05-01")
+    lightpen("tips", "add", "cone", "C-1", *where, "--set", "note=by the door")
+    retired = ("--set", "is_retired=true", "--reason", "chipped")
+    lightpen("tips", "change", "cone", "C-1", *where, *retired)
 
     listed = lightpen("tips", "list", *where[:2], "--json")
     (record,) = json.loads(listed.stdout)
@@ -54,24 +62,16 @@ def test_certificates_are_kept_and_only_references_have_a_value(
     lightpen: Run, tmp_path: Path
 ) -> None:
     where = ("--data", tmp_path / "data")
-    dated = ("--certificate", "K-17", "--certified", "2026-03-01")
-    lightpen(
-        "tips",
-        "add",
-        "reference",
-        "R-1",
-        *where,
-        *dated,
-        "--value",
-        "31.7512",
-        *("--shape", "ring", "--value-uncertainty", "0.0005"),
-    )
+    dated = ("--set", "certificate=K-17", "certified=2026-03-01")
+    ring = ("certified_mm=31.7512", "shape=ring", "uncertainty_mm=0.0005")
+    lightpen("tips", "add", "reference", "R-1", *where, *dated, *ring)
     lightpen("tips", "add", "camera", "CAM-7", *where, *dated)
-    refused = lightpen("tips", "change", "camera", "CAM-7", *where, "--value", "3")
-    lightpen("tips", "change", "camera", "CAM-7", *where, "--certified", "none")
+    camera = ("tips", "change", "camera", "CAM-7", *where)
+    refused = lightpen(*camera, "--set", "certified_mm=3")
+    lightpen(*camera, "--set", "certified=")
 
     camera, reference = json.loads(lightpen("tips", "list", *where, "--json").stdout)
-    assert "Only a reference has a certified value" in refused.stderr
+    assert "'certified_mm' is not an entry of a camera" in refused.stderr
     assert (camera["certificate"], camera["certified"]) == ("K-17", None)
     assert (reference["certified"], reference["certified_mm"]) == (
         "2026-03-01",
@@ -93,9 +93,20 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
 ) -> None:
     where = ("--data", tmp_path / "data")
     for words, reported in (
-        (("add", "tip", "T-1", "--ball-diameter", "0"), "diameter 0 mm is not valid"),
-        (("add", "cone", "C-1", "--ball-diameter", "5"), "Only a tip has a ball"),
-        (("add", "tip", "T-1", "--nominal", "0", "1"), "takes three numbers"),
+        (
+            ("add", "tip", "T-1", "--set", "ball_diameter_mm=0"),
+            "not a valid ball_diameter_mm",
+        ),
+        (
+            ("add", "cone", "C-1", "--set", "ball_diameter_mm=5"),
+            "not an entry of a cone",
+        ),
+        (
+            ("add", "tip", "T-1", "--set", "nominal_tip_mm=0 1"),
+            "not a valid nominal_tip_mm",
+        ),
+        (("add", "tip", "T-1", "--set", "due=soon"), "'soon' is not a valid due"),
+        (("add", "pen", "LP", "--set", "id=other"), "not an entry of a pen"),
         (("change", "tip", "T-1"), "There is no tip T-1 in the library"),
     ):
         refused = lightpen("tips", *words, *where)

@@ -21,7 +21,6 @@ DataFolder: TypeAlias = Callable[[], Path]
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
-FORGOTTEN = object()  # value of an option that clears an entry
 RULE_WORDS = {
     "simple": DecisionRule.SIMPLE,
     "guard-band": DecisionRule.GUARD_BAND,

@@ -2,19 +2,18 @@
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from msgspec import structs, to_builtins
+from msgspec import ValidationError, convert, to_builtins
 
 from lightpen.archive.logbook import Logbook, folder_statuses
-from lightpen.commands.arguments import FORGOTTEN, data_of, supervisor_signature
+from lightpen.commands.arguments import data_of, supervisor_signature
 from lightpen.commands.console import Command, printing, shown
 from lightpen.errors import ArchiveError, UsageError
 from lightpen.local_time import local_now
-from lightpen.model.artefacts import ArtefactKind, Side
+from lightpen.messages import printable
 from lightpen.model.limits import DueRule
 from lightpen.record.library.library_changes import (
     Author,
@@ -22,34 +21,20 @@ from lightpen.record.library.library_changes import (
     change_item,
     keep_picture,
     known_item,
-    retire_item,
 )
 from lightpen.record.library.tip_library import (
+    KIND_WORDS,
     MADE,
     AnyItem,
     ItemKind,
     Library,
-    ListedReference,
     ListedTip,
     StationStatus,
     read_library,
 )
 
-OF_REFERENCES: dict[str, tuple[str, Callable[[Any], Any]]] = {  # options and types
-    "certified_mm": ("value", float),
-    "shape": ("shape", ArtefactKind),
-    "uncertainty_mm": ("value_uncertainty", float),
-    "side": ("side", Side),
-    "expansion_ppm": ("expansion", float),
-}
-OF_TIPS = {  # options, by their entry of a tip
-    "ball_diameter_mm": "ball_diameter",
-    "nominal_tip_mm": "nominal",
-    "max_change_mm": "max_change",
-    "max_days": "max_days",
-    "max_swings": "max_swings",
-    "picture": "picture",
-}
+VECTOR, PICTURE = "nominal_tip_mm", "picture"
+NOT_ENTERED = ("id", "led_file", "bending")  # stated otherwise
 
 
 @printing
@@ -89,66 +74,40 @@ def _change(options: argparse.Namespace) -> None:
     _enter_and_print(options, item, library)
 
 
-@printing
-def _set_retired(options: argparse.Namespace) -> None:
-    data, kind = data_of(options), ItemKind(options.kind)
-    is_retired = options.action == "retire"
-    by, now = _author(options), local_now()
-    library = retire_item(data, kind, options.id, by, now, is_retired=is_retired)
-    _enter_and_print(options, known_item(library, kind, options.id), library)
-
-
-ACTIONS: dict[str, Command] = {
-    "list": _list,
-    "add": _add,
-    "change": _change,
-    "retire": _set_retired,
-    "return": _set_retired,
-}
+ACTIONS: dict[str, Command] = {"list": _list, "add": _add, "change": _change}
 
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
-    """Return an item with the given entries."""
-    for name in ("note", "certificate", "due", "certified"):
-        value = getattr(options, name)
-        if value is not None:
-            item = structs.replace(item, **{name: _or_none(value)})
-    of_reference = {
-        entry: None if value is FORGOTTEN else of_type(value)
-        for entry, (option, of_type) in OF_REFERENCES.items()
-        if (value := getattr(options, option)) is not None
-    }
-    if of_reference and not isinstance(item, ListedReference):
-        raise UsageError("library.only-references", id=item.id)
-    item = structs.replace(item, **of_reference)
-    entries = dict(_entries_of_tip(options))
-    if entries and not isinstance(item, ListedTip):
-        raise UsageError("library.only-tips", id=item.id)
-    return structs.replace(item, **entries)
+    """Return an item with the given entries, each as its field takes it."""
+    entries: dict[str, Any] = to_builtins(item)
+    known = [name for name in item.__struct_fields__ if name not in NOT_ENTERED]
+    for word in options.set:
+        name, _, text = word.partition("=")
+        if name not in known:
+            raise UsageError(
+                "library.no-entry",
+                entry=printable(name),
+                kind=KIND_WORDS[item.kind],
+                known=", ".join(known),
+            )
+        entries.pop(name)
+        if text:
+            entries[name] = _value(name, text, options)
+        try:
+            item = convert(entries, type(item), strict=False)
+        except ValidationError as error:
+            raise UsageError(
+                "library.bad-entry", entry=name, value=printable(text), why=str(error)
+            ) from error
+    return item
 
 
-def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
-    for entry, option in OF_TIPS.items():
-        value = getattr(options, option)
-        if value is None:
-            continue
-        if option == "nominal":
-            value = _point(option, value)
-        elif option == "picture" and value is not FORGOTTEN:
-            value = keep_picture(data_of(options), value)
-        yield entry, _or_none(value)
-
-
-def _or_none(value: Any) -> Any:
-    return None if value is FORGOTTEN else value
-
-
-def _point(option: str, words: list[Any]) -> Any:
-    if words == [FORGOTTEN]:
-        return FORGOTTEN
-    if len(words) != 3 or FORGOTTEN in words:
-        raise UsageError("library.no-point", option=option)
-    return tuple(words)
+def _value(name: str, text: str, options: argparse.Namespace) -> Any:
+    if name == VECTOR:
+        return text.split()
+    if name == PICTURE:
+        return to_builtins(keep_picture(data_of(options), Path(text)))
+    return text
 
 
 def _author(options: argparse.Namespace) -> Author:
