@@ -20,6 +20,7 @@ from typing import IO, TYPE_CHECKING, Any
 import pytest
 from filelock import FileLock
 from hypothesis import settings
+from tests.simulated_centers import calibrate_pixels
 
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
@@ -447,10 +448,7 @@ def stated() -> dict[str, Any]:
     import numpy as np
     from benchmarks.small_records import entries_of
 
-    from lightpen.detection.observations import observe_centers
-    from lightpen.estimation.calibrate import calibrate
     from lightpen.estimation.reports.report import calibration_record
-    from lightpen.formats.observation_files import Centers
     from lightpen.formats.opened_files import InputFile, Inputs
     from lightpen.model.limits import SwingLimits
     from lightpen.model.names import Origin
@@ -465,8 +463,7 @@ def stated() -> dict[str, Any]:
         *(camera, pen, poses.rotations, translations), 0.02, rng
     )
     pixels[3, 2:] = np.nan
-    centers = Centers(np.arange(60) + 1, pixels, Path("centers.csv"))
-    calibration = calibrate(camera, pen, observe_centers(centers, camera, pen))
+    calibration = calibrate_pixels(pixels, camera, pen)
     file = InputFile(Path("folder/file.csv"), 64 * "0")
     inputs = Inputs(file, file, (file,), pen.nominal_tip, origin=Origin.RECORDED)
     limits = SwingLimits(max_uncertainty=0.05, min_images=12)

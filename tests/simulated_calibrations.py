@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_centers import observe_pixels, simulate_rig_centers
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.observations import Observations
 from lightpen.detection.rig_observations import observe_rig_centers
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
@@ -57,8 +57,7 @@ def observed(
         *(CAMERA, PEN, swing.rotations, swing.translations),
         *(0.0, np.random.default_rng(0)),
     )
-    centers = Centers(np.arange(len(swing)) + 1, exact + errors, Path("simulated"))
-    return observe_centers(centers, camera, pen)
+    return observe_pixels(exact + errors, camera, pen)
 
 
 def disc_areas(swing: Swing, diameter: float, rng: np.random.Generator) -> FloatArray:
@@ -237,8 +236,7 @@ def uneven() -> Calibration:
     sigmas[:, 3] *= 5
     pixels += sigmas[..., None] * rng.standard_normal(pixels.shape)
     sigmas[:, 3] /= 5
-    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, PEN)
+    seen = observe_pixels(pixels, CAMERA, PEN)
     return calibrate(CAMERA, PEN, replace(seen, sigmas=sigmas))
 
 

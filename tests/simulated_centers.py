@@ -1,8 +1,14 @@
 """Centres of LEDs as tests and benchmarks need them: noise, several cameras, faults."""
 
+from pathlib import Path
+
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig
 from lightpen_extensions.simulator.swings import Swing, seen_from, simulate_centers
@@ -86,3 +92,14 @@ def swap_centers(
         pair = rng.permutation(n_leds)[:2]
         swapped[frame, pair] = centers[frame, pair[::-1]]
     return swapped
+
+
+def observe_pixels(pixels: FloatArray, camera: Camera, pen: Pen) -> Observations:
+    """Return the observations of simulated LED centres (N, L, 2), px."""
+    centers = Centers(np.arange(len(pixels)) + 1, pixels, Path("simulated"))
+    return observe_centers(centers, camera, pen)
+
+
+def calibrate_pixels(pixels: FloatArray, camera: Camera, pen: Pen) -> Calibration:
+    """Calibrate by simulated LED centres (N, L, 2), px."""
+    return calibrate(camera, pen, observe_pixels(pixels, camera, pen))

@@ -658,7 +658,6 @@ def test_more_images_than_can_be_held_are_not_simulated(
     [
         ("--form-error", "1e308"),
         ("--center-bias", "1e300"),
-        ("--distance-sigma", "1e-300"),
         ("--temperature-sigma", "1e9"),
         ("--scale-sigma", "1e-300"),
     ],

@@ -1,15 +1,12 @@
 """Images that are copies of others count once."""
 
-from pathlib import Path
-
 import numpy as np
+from tests.simulated_centers import calibrate_pixels, observe_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers, without_copies
+from lightpen.detection.observations import without_copies
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
-from lightpen.formats.observation_files import Centers
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
@@ -27,8 +24,7 @@ def swung(n_images: int = 40) -> FloatArray:
 
 
 def reasons(pixels: FloatArray) -> list[Reason]:
-    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
-    return list(without_copies(observe_centers(centers, CAMERA, PEN)).reasons)
+    return list(without_copies(observe_pixels(pixels, CAMERA, PEN)).reasons)
 
 
 def test_images_of_a_pen_at_rest_differ_by_their_noise() -> None:
@@ -39,11 +35,10 @@ def test_images_of_a_pen_at_rest_differ_by_their_noise() -> None:
 
 def test_images_given_three_times_are_worth_as_much_as_once() -> None:
     pixels = swung()
-    results = []
-    for given in (pixels, np.concatenate([pixels] * 3)):
-        centers = Centers(np.arange(len(given)), given, Path("simulated"))
-        results.append(calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN)))
-    once, thrice = results
+    once, thrice = (
+        calibrate_pixels(given, CAMERA, PEN)
+        for given in (pixels, np.concatenate([pixels] * 3))
+    )
     np.testing.assert_allclose(thrice.joint.tip_pen, once.joint.tip_pen, atol=1e-9)
     np.testing.assert_allclose(
         thrice.budget.expanded_uncertainty, once.budget.expanded_uncertainty

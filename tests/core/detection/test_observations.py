@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_centers import observe_pixels
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.observations import (
@@ -194,10 +195,9 @@ def test_a_given_centre_beyond_the_fold_of_the_distortion_is_not_seen(
 
 
 def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:
-    centers = Centers(np.arange(6) + 1, 3 * true_centers(plan), Path("centers.csv"))
 
     with pytest.raises(FileError, match="made for 2448 x 2048"):
-        observe_centers(centers, CAMERA, PEN)
+        observe_pixels(3 * true_centers(plan), CAMERA, PEN)
 
 
 def test_an_image_given_twice_counts_once(images: list[Image]) -> None:

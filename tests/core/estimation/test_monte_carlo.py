@@ -2,16 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
-from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import DiameterReading
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.monte_carlo import (
     MonteCarlo,
     Trials,
@@ -20,7 +19,6 @@ from lightpen.estimation.monte_carlo import (
     trials_of,
 )
 from lightpen.estimation.uncertainty.budget import center_errors
-from lightpen.formats.observation_files import Centers
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
@@ -47,8 +45,7 @@ def calibration() -> Calibration:
     pixels = simulate_centers(
         camera, pen, swing.rotations, swing.translations, 0.03, rng
     )
-    centers = Centers(np.arange(1, 26), pixels, Path("centers.csv"))
-    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+    return calibrate_pixels(pixels, camera, pen)
 
 
 @pytest.mark.slow

@@ -1,12 +1,9 @@
 """Tests of a tip before a fisheye."""
 
-from pathlib import Path
-
 import numpy as np
+from tests.simulated_centers import observe_pixels
 
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
-from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.limits import Assumptions
 from lightpen.model.rigid import rotation_from_vector
@@ -31,8 +28,7 @@ def test_a_pen_far_off_the_axis_of_a_fisheye_has_its_tip_within_u() -> None:
     pen, swing = paper_pen(), swing_poses(N_IMAGES, rng)
     R, t = OFF_AXIS @ swing.rotations, swing.translations @ OFF_AXIS.T
     pixels = simulate_centers(FISHEYE, pen, R, t, NOISE, rng)
-    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
-    observations = observe_centers(centers, FISHEYE, pen)
+    observations = observe_pixels(pixels, FISHEYE, pen)
     found = calibrate(FISHEYE, pen, observations, Assumptions())
 
     errors = found.joint.tip_pen - swing.tip_pen

@@ -4,12 +4,11 @@ from pathlib import Path
 
 import numpy as np
 from pytestqt.qtbot import QtBot
+from tests.simulated_centers import observe_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
-from lightpen.formats.observation_files import Centers
 from lightpen.record.swings.solving import RecordSource, Solution
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.widgets.result_plots import ArrowPlot
@@ -31,8 +30,7 @@ def solution_with_lens(amplitude: float) -> Solution:
         camera, pen, swing.rotations, swing.translations, 0.03, rng
     )
     waves: FloatArray = np.sin(exact[..., ::-1] / 280.0)
-    centers = Centers(np.arange(N_IMAGES), exact + amplitude * waves, Path("simulated"))
-    seen = observe_centers(centers, camera, pen)
+    seen = observe_pixels(exact + amplitude * waves, camera, pen)
     found = calibrate(camera, pen, seen)
     nothing = ImageSource((), (), lambda: iter(()))
     source = RecordSource(Path(), nothing, camera, pen, (), (), Path())

@@ -1,18 +1,15 @@
 """Causes of a misfit: named if they remove it, and only then."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import cause_of_misfit
-from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
-from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.verdict import judge
-from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -115,17 +112,15 @@ def test_nothing_is_named_that_removes_no_misfit(pixels: FloatArray) -> None:
 
 @pytest.mark.parametrize("pen", [exchanged(1, 4), signed(-1, 1, 1)])
 def test_a_refused_calibration_names_the_cause(pen: Pen, pixels: FloatArray) -> None:
-    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
     with pytest.raises(CalibrationError) as info:
-        calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
+        calibrate_pixels(pixels, CAMERA, pen)
 
     assert info.value.message.values["cause"] == cause_of_misfit(CAMERA, pen, pixels)
 
 
 def test_a_verdict_names_the_cause_of_a_contradiction(pixels: FloatArray) -> None:
     cropped = pixels - [300, 200]
-    centers = Centers(np.arange(len(pixels)), cropped, Path("simulated"))
-    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    found = calibrate_pixels(cropped, CAMERA, PEN)
 
     verdict = judge(found, SwingLimits(max_uncertainty=1.0))
 

@@ -1,17 +1,16 @@
 """A step in the middle of a swing: its image, kind and size."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels, observe_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import leave_out, observe_centers
+from lightpen.detection.observations import leave_out
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
-from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
@@ -45,8 +44,7 @@ def swung(kind: str, shift: FloatArray, seed: int = 0) -> Calibration:
     elif kind == "drift":
         t += np.linspace(-0.5, 0.5, N)[:, None] * shift
     pixels = simulate_centers(CAMERA, PEN, R, t, 0.03, rng)
-    centers = Centers(np.arange(N) + 1, pixels, Path("simulated"))
-    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return calibrate_pixels(pixels, CAMERA, PEN)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +93,7 @@ def test_the_longer_part_alone_gives_the_tip() -> None:
     t = swing.translations.copy()
     t[FIRST:] -= swing.rotations[FIRST:] @ np.array([0.05, 0.0, 0.0])
     pixels = simulate_centers(CAMERA, PEN, swing.rotations, t, 0.03, rng)
-    centers = Centers(np.arange(N) + 1, pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, PEN)
+    seen = observe_pixels(pixels, CAMERA, PEN)
     step = calibrate(CAMERA, PEN, seen).step
     assert step is not None
     begin, end = step.longer_part(N)

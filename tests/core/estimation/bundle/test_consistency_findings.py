@@ -1,13 +1,12 @@
 """What the images say against a camera file: named, let go, and never passed over."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels, observe_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.consistency_findings import (
     DIAMETER,
     Contradiction,
@@ -17,7 +16,6 @@ from lightpen.estimation.bundle.consistency_findings import (
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
-from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
@@ -83,8 +81,7 @@ def calibrated(
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.03, rng
     )
-    centers = Centers(np.arange(n_images), pixels, Path("simulated"))
-    return swing, calibrate(file, PEN, observe_centers(centers, file, PEN))
+    return swing, calibrate_pixels(pixels, file, PEN)
 
 
 def names(result: Calibration) -> list[str]:
@@ -235,8 +232,7 @@ def test_noise_that_lasts_contradicts_no_true_file() -> None:
             CAMERA, PEN, swing.rotations, swing.translations, 0.0, rng
         )
         pixels = exact + 0.03 * errors
-        centers = Centers(np.arange(15), pixels, Path("simulated"))
-        observations = observe_centers(centers, CAMERA, PEN)
+        observations = observe_pixels(pixels, CAMERA, PEN)
         contradicted += bool(calibrate(CAMERA, PEN, observations).contradictions)
 
     assert contradicted <= 1

@@ -1,20 +1,19 @@
 """The diameter of the discs, by the areas of their images."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import observe_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.observations import Observations
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import MIN_READINGS, SHARP_EDGE, read_diameter
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -55,8 +54,7 @@ def observed(
     pixels = simulate_centers(
         CAMERA, pen, SWING.rotations, SWING.translations, 0.03, rng
     )
-    centers = Centers(np.arange(len(SWING)), pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, pen)
+    seen = observe_pixels(pixels, CAMERA, pen)
     return replace(seen, areas=areas, edge_widths=np.full(len(SWING), rim))
 
 

@@ -1,20 +1,17 @@
 """Fields of the images are found and corrected; a good station has none."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_centers import calibrate_pixels, simulate_rig_centers
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import FoundField, adjust, found_fields
 from lightpen.estimation.bundle.image_fields import FieldName, ImageField, size_of
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.formats.observation_files import Centers
+from lightpen.estimation.calibrate import Calibration
 from lightpen.model.camera import Camera
 from lightpen.model.fisheye import LensField
 from lightpen.model.limits import USUAL
@@ -47,8 +44,7 @@ def calibrated(
     pixels = simulate_centers(
         CAMERA, PEN, true.rotations, true.translations, SIGMA, rng
     )
-    centers = Centers(np.arange(N_IMAGES), pixels + shifts, Path("simulated"))
-    found = calibrate(camera, PEN, observe_centers(centers, camera, PEN))
+    found = calibrate_pixels(pixels + shifts, camera, PEN)
     return found, found.joint.tip_pen - true.tip_pen
 
 

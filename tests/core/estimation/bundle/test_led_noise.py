@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
@@ -156,8 +157,7 @@ def calibrated(sigmas: FloatArray, seed: int) -> tuple[Calibration, FloatArray]:
         CAMERA, PEN, swing.rotations, swing.translations, 0.0, rng
     )
     pixels += sigmas[:, None] * rng.standard_normal(pixels.shape)
-    centers = Centers(np.arange(60), pixels, Path("simulated"))
-    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    found = calibrate_pixels(pixels, CAMERA, PEN)
     return found, found.joint.tip_pen - swing.tip_pen
 
 

@@ -1,18 +1,14 @@
 """Each LED's fit: a displaced one is named, a good one is not."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_centers import drop_centers
+from tests.simulated_centers import calibrate_pixels, drop_centers
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.led_quality import LedQuality, measure_leds
-from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
-from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.simulator.swings import (
@@ -38,8 +34,7 @@ def quality(measured: Pen, n_missing: int = 0) -> LedQuality:
 
 
 def quality_of(measured: Pen, pixels: FloatArray) -> LedQuality:
-    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
-    return calibrate(CAMERA, measured, observe_centers(centers, CAMERA, measured)).leds
+    return calibrate_pixels(pixels, CAMERA, measured).leds
 
 
 @pytest.mark.parametrize("led", [1, 10])

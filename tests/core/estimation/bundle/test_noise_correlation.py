@@ -3,56 +3,28 @@
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_calibrations import CAMERA, PEN, lasting, observed
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.noise_correlation import lag1
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.swings import (
-    Swing,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
-
-CAMERA = paper_camera()
-PEN = replace(paper_pen(), led_sigma=0.002)
-
-
-def lasting(n_images: int, coefficient: float, seed: int) -> FloatArray:
-    """Return first-order autoregressive noise, (N, L, 2), of variance 1."""
-    rng = np.random.default_rng([seed, 3])
-    noise = rng.standard_normal((n_images, PEN.n_leds, 2))
-    for i in range(1, n_images):
-        fresh = np.sqrt(1 - coefficient**2) * noise[i]
-        noise[i] = coefficient * noise[i - 1] + fresh
-    return noise
+from lightpen_extensions.simulator.swings import Swing, swing_poses
 
 
 def calibrated(swing: Swing, errors: FloatArray, pen: Pen = PEN) -> Calibration:
-    exact = simulate_centers(
-        CAMERA,
-        PEN,
-        *(swing.rotations, swing.translations, 0.0),
-        np.random.default_rng(0),
-    )
-    centers = Centers(np.arange(len(swing)), exact + errors, Path("simulated"))
-    return calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
+    return calibrate(CAMERA, pen, observed(swing, errors, CAMERA, pen))
 
 
 @cache
 def of_noise(n_images: int, coefficient: float, seed: int) -> tuple[Swing, Calibration]:
     swing = swing_poses(n_images, np.random.default_rng(seed))
-    return swing, calibrated(swing, 0.03 * lasting(n_images, coefficient, seed))
+    return swing, calibrated(swing, 0.03 * lasting(seed, coefficient, n_images))
 
 
 @pytest.mark.slow
@@ -95,7 +67,7 @@ def test_noise_that_lasts_is_not_counted_again_as_errors_of_leds_and_drift() -> 
     for seed in range(5):
         swing = swing_poses(60, np.random.default_rng(seed))
         unstated = replace(PEN, led_sigma=None)
-        result = calibrated(swing, 0.03 * lasting(60, 0.9, seed), unstated)
+        result = calibrated(swing, 0.03 * lasting(seed, 0.9, 60), unstated)
         # Fitted as if the LEDs were off, which takes noise out of the tip.
         assert result.bundle.components.leds.sigma > 0.001
         of = {
@@ -110,7 +82,7 @@ def test_noise_that_lasts_is_not_counted_again_as_errors_of_leds_and_drift() -> 
 
 
 def test_an_led_that_is_not_used_has_no_part_in_the_correlation() -> None:
-    residuals = lasting(200, 0.9, 1)
+    residuals = lasting(1, 0.9, 200)
     used = np.ones((200, PEN.n_leds), dtype=bool)
     used[:, 0] = False
     residuals[:, 0] = np.nan
@@ -123,4 +95,4 @@ def test_images_without_neighbours_tell_no_correlation() -> None:
     used = np.zeros((20, PEN.n_leds), dtype=bool)
     used[::2] = True
 
-    assert lag1(lasting(20, 0.9, 1), used) == 0.0
+    assert lag1(lasting(1, 0.9, 20), used) == 0.0

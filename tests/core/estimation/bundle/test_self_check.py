@@ -2,20 +2,18 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
 from lightpen.estimation.bundle.linearised import BundleState, views_at
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
-from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import from_first, nearest_rotation, vector_from_rotation
 from lightpen_extensions.simulator.scenes import row_of_cameras
@@ -48,8 +46,7 @@ def good() -> tuple[Swing, FloatArray, Calibration]:
 
 
 def calibrated(pixels: FloatArray) -> Calibration:
-    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
-    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return calibrate_pixels(pixels, CAMERA, PEN)
 
 
 def checked(state: BundleState, pixels: FloatArray) -> tuple[SelfCheck, float]:

@@ -1,22 +1,19 @@
 """A displaced LED leaves two frames, and both tips are reported."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
 from lightpen.estimation.bundle.image_fields import seat_modes_of
 from lightpen.estimation.bundle.led_quality import LedQuality, tip_frames
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
-from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import USUAL, SwingLimits
 from lightpen.model.rigid import fit_rigid, rig_of
 from lightpen_extensions.simulator.swings import (
@@ -39,8 +36,7 @@ def test_a_displaced_led_leaves_two_frames() -> None:
     pixels = simulate_centers(
         CAMERA, true, swing.rotations, swing.translations, 0.02, rng
     )
-    centers = Centers(np.arange(60), pixels, Path("simulated"))
-    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    found = calibrate_pixels(pixels, CAMERA, PEN)
     assert found.leds.displaced == (9,)
     frames = found.tip_frames
     assert frames is not None

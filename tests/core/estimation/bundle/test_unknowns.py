@@ -1,19 +1,17 @@
 """LEDs, seat and drift: errors are found, corrected and covered, and none invented."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.image_fields import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
-from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen, effective_tip
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.simulator.swings import (
@@ -44,8 +42,7 @@ def calibrated(
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations + seat, sigma, rng
     )
-    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-    return calibrate(CAMERA, measured, observe_centers(centers, CAMERA, measured))
+    return calibrate_pixels(pixels, CAMERA, measured)
 
 
 def perturbed(sigma: float, seed: int, stated: float | None = None) -> Pen:

@@ -1,14 +1,14 @@
 """A camera that moves during the swing, and the lamps that witness it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import observe_pixels
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.fixed_lamps import lamps_among
-from lightpen.detection.observations import Observations, leave_out, observe_centers
+from lightpen.detection.observations import Observations, leave_out
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -20,7 +20,6 @@ from lightpen.estimation.contact.single_images import (
 )
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
-from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
@@ -48,8 +47,7 @@ def seen_along(pen_way: FloatArray) -> Observations:
     rng = np.random.default_rng(7)
     poses = SWING.rotations, SWING.translations
     pixels = simulate_centers(CAMERA, PEN, *poses, SIGMA, rng) + pen_way[:, None]
-    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
-    return observe_centers(centers, CAMERA, PEN)
+    return observe_pixels(pixels, CAMERA, PEN)
 
 
 def solved(pen_way: FloatArray, lamp_way: FloatArray) -> Calibration:
@@ -151,8 +149,7 @@ def test_a_hard_bump_of_the_camera_is_reported_in_pixels(bump: float) -> None:
     rays = np.column_stack([CAMERA.unproject(LAMPS), np.ones(2)])
     shown = np.where(is_after[..., None], CAMERA.project(rays @ turn.T), LAMPS)
     noisy = shown + 0.02 * rng.standard_normal(shown.shape)
-    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, PEN)
+    seen = observe_pixels(pixels, CAMERA, PEN)
     lamps = lamps_among(np.zeros((N_IMAGES, 0, 2)), list(noisy))
     calibration = calibrate(CAMERA, PEN, replace(seen, lamps=lamps))
     reported = [str(each) for each in warnings_of(calibration)]
@@ -251,8 +248,7 @@ def test_the_motion_of_a_camera_is_taken_out_as_its_turn() -> None:
         ],
         axis=1,
     )
-    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
-    seen = replace(observe_centers(centers, CAMERA, PEN), lamps=lamps)
+    seen = replace(observe_pixels(pixels, CAMERA, PEN), lamps=lamps)
     steady = pose_steadily(CAMERA, PEN, seen)
 
     still = simulate_centers(CAMERA, PEN, SWING.rotations, SWING.translations, 0.0, rng)

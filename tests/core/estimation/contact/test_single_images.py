@@ -1,14 +1,14 @@
 """Which images of one camera take part, and the words for too few of them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import observe_pixels
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
-from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.single_images import (
@@ -17,7 +17,6 @@ from lightpen.estimation.contact.single_images import (
     require_fit,
     require_images,
 )
-from lightpen.formats.observation_files import Centers
 from lightpen.messages import Message, message
 from lightpen_extensions.simulator.swings import (
     paper_camera,
@@ -37,8 +36,7 @@ def observed(moves: FloatArray | float = 0.0, sigma: float = 0.01) -> Observatio
         *(SWING.rotations, SWING.translations + moves, sigma),
         np.random.default_rng(2),
     )
-    centers = Centers(np.arange(24), pixels, Path("simulated"))
-    return observe_centers(centers, CAMERA, PEN)
+    return observe_pixels(pixels, CAMERA, PEN)
 
 
 def with_slips(distance: float, width: float) -> PosedImages:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.small_records import record_of
+from tests.simulated_centers import calibrate_pixels
 
-from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
@@ -28,7 +28,6 @@ from lightpen.estimation.uncertainty.budget import (
     ContributionName,
     UncertaintyContribution,
 )
-from lightpen.formats.observation_files import Centers
 from lightpen.formats.opened_files import InputFile, Inputs
 from lightpen.formats.own_json import json_bytes
 from lightpen.model.camera import Camera
@@ -60,8 +59,7 @@ def calibration() -> Calibration:
     pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.02, rng)
     pixels[3, 2:] = np.nan
     pixels[:, 9] = np.nan
-    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
-    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return calibrate_pixels(pixels, CAMERA, PEN)
 
 
 def of_camera(file: Camera) -> Calibration:
@@ -71,8 +69,7 @@ def of_camera(file: Camera) -> Calibration:
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.02, rng
     )
-    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
-    return calibrate(file, PEN, observe_centers(centers, file, PEN))
+    return calibrate_pixels(pixels, file, PEN)
 
 
 def verdict() -> Verdict:
@@ -276,8 +273,7 @@ def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.02, rng
     )
-    centers = Centers(np.arange(60) + 1, pixels, Path("centers.csv"))
-    one_sided = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    one_sided = calibrate_pixels(pixels, CAMERA, PEN)
     limits = SwingLimits(max_uncertainty=1.0)
 
     written = json_bytes(calibration_record(one_sided, INPUTS, limits))
@@ -359,8 +355,7 @@ def test_large_residuals_are_warned_of() -> None:
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.3, rng
     )
-    centers = Centers(np.arange(20) + 1, pixels, Path("centers.csv"))
-    noisy = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    noisy = calibrate_pixels(pixels, CAMERA, PEN)
 
     (warning,) = warnings_of(noisy)
 
@@ -399,8 +394,7 @@ def test_a_jitter_is_reported_where_it_is_more_than_round_parts_make(
     seat = jitter * rng.standard_normal(swing.translations.shape)
     translations = swing.translations + seat
     pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.001, rng)
-    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
-    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    found = calibrate_pixels(pixels, CAMERA, PEN)
 
     assert found.bundle.components.jitter.covariance is not None
     reported = {warning.code for warning in warnings_of(found)}

@@ -1,13 +1,12 @@
 """The verdict: good, to be looked at, or to be repeated, with the reason."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import calibrate_pixels, observe_pixels
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import rejected_centres, warnings_of
@@ -31,7 +30,6 @@ from lightpen.estimation.uncertainty.budget import (
     UncertaintyContribution,
 )
 from lightpen.estimation.variance_components import Component
-from lightpen.formats.observation_files import Centers
 from lightpen.messages import NO_TEMPERATURE, Code, Message, message, too_little_tilt
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
@@ -56,8 +54,7 @@ def calibrated(
     pixels: FloatArray = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, sigma, rng
     )
-    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+    return calibrate_pixels(pixels, camera, pen)
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +83,7 @@ def test_a_two_stage_tip_of_small_discs_passes() -> None:
         0.02,
         np.random.default_rng(1),
     )
-    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, small)
+    seen = observe_pixels(pixels, CAMERA, small)
     found = replace(calibrate(CAMERA, small, seen), method="two-stage")
 
     verdict = judge(found, SwingLimits(max_uncertainty=0.03))
@@ -144,8 +140,7 @@ def test_five_dark_leds_say_nothing_about_the_seat() -> None:
             *(0.05, rng),
         )
         pixels[:, rng.permutation(10)[:5]] = np.nan
-        centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-        found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+        found = calibrate_pixels(pixels, CAMERA, PEN)
         assert "warning.seat-jitter" not in {each.code for each in warnings_of(found)}
 
 
@@ -335,8 +330,7 @@ def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
         *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
         np.random.default_rng(1),
     )
-    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-    calibration = calibrate(CAMERA, wrong, observe_centers(centers, CAMERA, wrong))
+    calibration = calibrate_pixels(pixels, CAMERA, wrong)
 
     verdict = judge(calibration, SwingLimits(max_uncertainty=0.05))
     assert verdict.grade is Grade.CHECK
@@ -626,9 +620,8 @@ def test_faces_of_small_leds_in_images_are_said_to_be_unknown(
     pixels = simulate_centers(
         CAMERA, pen, swing.rotations, swing.translations, 0.05, np.random.default_rng(1)
     )
-    centers = Centers(np.arange(30), pixels, Path("simulated"))
     seen = replace(
-        observe_centers(centers, CAMERA, pen), edge_widths=np.full(30, edge_width)
+        observe_pixels(pixels, CAMERA, pen), edge_widths=np.full(30, edge_width)
     )
     warnings = warnings_of(calibrate(CAMERA, pen, seen))
     found = [each for each in warnings if each.code == "warning.small-leds"]

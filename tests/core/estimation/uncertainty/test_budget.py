@@ -1,13 +1,12 @@
 """The budget: its shares, blocks, halves and the weakest direction."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_calibrations import CAMERA, PEN, lasting, observed
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
@@ -21,33 +20,14 @@ from lightpen.estimation.uncertainty.budget import (
     compare_halves,
     contributions_of,
 )
-from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rig_of
-from lightpen_extensions.simulator.swings import (
-    Swing,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import Swing, simulate_centers, swing_poses
 
-CAMERA = paper_camera()
-PEN = replace(paper_pen(), led_sigma=0.002)
 SWING = swing_poses(100, np.random.default_rng(0))
 FEW = swing_poses(40, np.random.default_rng(0))
-
-
-def noise(seed: int, correlation: float = 0.0, n_images: int = 100) -> FloatArray:
-    """Return normal noise whose neighbours in time are correlated, unit variance."""
-    rng = np.random.default_rng(seed)
-    fresh = rng.standard_normal((n_images, PEN.n_leds, 2))
-    series = fresh.copy()
-    for i in range(1, n_images):
-        series[i] = correlation * series[i - 1] + np.sqrt(1 - correlation**2) * fresh[i]
-    return series
 
 
 def seen(errors: FloatArray, swing: Swing = SWING) -> FloatArray:
@@ -69,8 +49,7 @@ def fit(errors: FloatArray, swing: Swing = SWING) -> JointFit:
 def calibrated(
     errors: FloatArray, swing: Swing = FEW, camera: Camera = CAMERA, pen: Pen = PEN
 ) -> Calibration:
-    centers = Centers(np.arange(len(swing)), seen(errors, swing), Path("simulated"))
-    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+    return calibrate(camera, pen, observed(swing, errors, camera, pen))
 
 
 def of_images(joint: JointFit, some: slice) -> JointFit:
@@ -114,10 +93,10 @@ def variance_of(budget: Budget, name: ContributionName) -> FloatArray:
 
 
 def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
-    adjustment = adjusted(calibrated(0.05 * noise(0, n_images=40)))
+    adjustment = adjusted(calibrated(0.05 * lasting(0, 0.0)))
     ratios, raised = [], []
     for seed in range(10):
-        joint = fit(0.05 * noise(seed))
+        joint = fit(0.05 * lasting(seed, 0.0, 100))
         for first in range(0, 99, 9):  # three blocks each
             budget = combine(adjustment, of_images(joint, slice(first, first + 9)))
             ratios.append(budget.block_ratio)
@@ -132,7 +111,7 @@ def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
 @pytest.mark.slow
 def test_independent_noise_is_hardly_ever_raised() -> None:
     factors = [
-        calibrated(0.05 * noise(seed, n_images=40)).budget.correlation_factor
+        calibrated(0.05 * lasting(seed, 0.0)).budget.correlation_factor
         for seed in range(20)
     ]
 
@@ -145,7 +124,7 @@ def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has() -> None
     swing = swing_poses(60, np.random.default_rng(0), "operator")
     errors, independent, raised = [], [], []
     for seed in range(10):
-        result = calibrated(0.05 * noise(seed, 0.9, 60), swing)
+        result = calibrated(0.05 * lasting(seed, 0.9, 60), swing)
         errors.append(result.joint.tip_pen - swing.tip_pen)
         independent.append(np.diag(result.budget.independent_noise)[:3])
         # What seat and centres may do besides is counted, not drawn.
@@ -161,7 +140,7 @@ def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has() -> None
 def test_halves_differ_as_predicted() -> None:
     outside = 0
     for seed in range(100):
-        halves = compare_halves(fit(0.05 * noise(seed)))
+        halves = compare_halves(fit(0.05 * lasting(seed, 0.0, 100)))
         beyond = np.abs(halves.difference) > halves.expanded_uncertainty
         outside += int(beyond.sum())
 
@@ -169,7 +148,7 @@ def test_halves_differ_as_predicted() -> None:
 
 
 def test_halves_agree_with_two_fits_of_half_the_images() -> None:
-    errors = 0.05 * noise(1)
+    errors = 0.05 * lasting(1, 0.0, 100)
     errors[1::2, :4] = np.nan  # so that one half knows more than the other
     odd, even = (
         fit_contact(
@@ -192,7 +171,7 @@ def test_halves_agree_with_two_fits_of_half_the_images() -> None:
 @pytest.mark.slow
 def test_the_shares_add_up_to_the_covariance() -> None:
     for correlation in (0.0, 0.9):
-        result = calibrated(0.05 * noise(8, correlation, 40))
+        result = calibrated(0.05 * lasting(8, correlation, 40))
         budget, bundle = result.budget, adjusted(result).bundle
         np.testing.assert_allclose(
             budget.covariance, sum(share.covariance for share in budget.shares)
@@ -212,7 +191,7 @@ def test_the_shares_add_up_to_the_covariance() -> None:
 
 
 def test_what_a_file_may_be_off_beyond_its_prior_counts_as_camera() -> None:
-    bundle = adjusted(calibrated(0.05 * noise(8, n_images=40))).bundle
+    bundle = adjusted(calibrated(0.05 * lasting(8, 0.0))).bundle
     at, unknowns = bundle.layout.cameras[0], bundle.unknowns
     (stated,) = unknowns.priors.cameras
     # As much again as its prior.
@@ -236,7 +215,7 @@ def test_what_a_file_may_be_off_beyond_its_prior_counts_as_camera() -> None:
 
 
 def test_a_camera_whose_file_states_nothing_makes_the_share_assumed() -> None:
-    bundle = adjusted(calibrated(0.05 * noise(8, n_images=40))).bundle
+    bundle = adjusted(calibrated(0.05 * lasting(8, 0.0))).bundle
     unknowns = bundle.unknowns
     (stated,) = unknowns.priors.cameras
     for assumed in (False, True):
@@ -248,7 +227,7 @@ def test_a_camera_whose_file_states_nothing_makes_the_share_assumed() -> None:
 
 
 def test_the_camera_has_the_share_by_which_a_perfect_one_would_shrink_u() -> None:
-    errors = 0.03 * noise(2, n_images=40)
+    errors = 0.03 * lasting(2, 0.0)
     assert CAMERA.covariance is not None
     exact = replace(CAMERA, covariance=1e-8 * CAMERA.covariance)
 
@@ -268,7 +247,7 @@ def test_the_camera_has_the_share_by_which_a_perfect_one_would_shrink_u() -> Non
 
 
 def test_a_camera_that_states_nothing_is_assumed_and_counted() -> None:
-    errors = 0.03 * noise(3, n_images=40)
+    errors = 0.03 * lasting(3, 0.0)
     assumed = calibrated(errors, camera=replace(CAMERA, covariance=None)).budget
 
     marked = {share.name for share in assumed.shares if share.assumed}
@@ -277,20 +256,20 @@ def test_a_camera_that_states_nothing_is_assumed_and_counted() -> None:
 
 def test_a_pen_that_states_nothing_is_assumed_and_counted() -> None:
     bare = replace(PEN, led_sigma=None, scale_sigma=None, diameter_sigma=None)
-    budget = calibrated(0.03 * noise(4, n_images=40), pen=bare).budget
+    budget = calibrated(0.03 * lasting(4, 0.0), pen=bare).budget
 
     marked = {share.name for share in budget.shares if share.assumed}
     assert marked == {ContributionName.DIAMETER, *OF_STATION}
 
 
 def test_of_files_that_state_all_only_the_station_is_assumed() -> None:
-    budget = calibrated(0.03 * noise(5, n_images=40)).budget
+    budget = calibrated(0.03 * lasting(5, 0.0)).budget
 
     assert {share.name for share in budget.shares if share.assumed} == OF_STATION
 
 
 def test_the_scale_of_the_pen_is_no_uncertainty_of_its_tip() -> None:
-    errors = 0.03 * noise(6, n_images=40)
+    errors = 0.03 * lasting(6, 0.0)
     exact, loose = (
         calibrated(errors, pen=replace(PEN, scale_sigma=sigma)).budget
         for sigma in (1e-7, 1e-3)
@@ -302,9 +281,9 @@ def test_the_scale_of_the_pen_is_no_uncertainty_of_its_tip() -> None:
 
 
 def test_too_few_images_for_blocks_are_said_so() -> None:
-    calibration = calibrated(0.01 * noise(4, n_images=40))
+    calibration = calibrated(0.01 * lasting(4, 0.0))
 
-    some = of_images(fit(0.01 * noise(4)), slice(8))
+    some = of_images(fit(0.01 * lasting(4, 0.0, 100)), slice(8))
     budget = combine(adjusted(calibration), some)
 
     assert budget.blocks is None
@@ -312,7 +291,7 @@ def test_too_few_images_for_blocks_are_said_so() -> None:
 
 
 def test_the_weakest_direction_is_where_the_covariance_is_largest() -> None:
-    budget = calibrated(0.05 * noise(5, n_images=40)).budget
+    budget = calibrated(0.05 * lasting(5, 0.0)).budget
     weakest = budget.weakest_direction
     tip = budget.covariance[:3, :3]
 
@@ -330,7 +309,7 @@ def test_a_seat_that_jitters_counts_as_seat_and_not_as_noise_too() -> None:
     for _ in range(3):
         jitter = 0.01 * rng.standard_normal(SWING.translations.shape)
         moved = replace(SWING, translations=SWING.translations + jitter)
-        budget = calibrated(0.03 * noise(8), moved).budget
+        budget = calibrated(0.03 * lasting(8, 0.0, 100), moved).budget
 
         assert any(share.name is ContributionName.SEAT for share in budget.shares)
         # Chance alone makes it 1.5 once in a hundred; the jitter would make it 2.5.
@@ -339,7 +318,7 @@ def test_a_seat_that_jitters_counts_as_seat_and_not_as_noise_too() -> None:
 
 
 def test_errors_of_the_centres_shrink_with_up_to_thirty_images() -> None:
-    bundle = adjusted(calibrated(0.05 * noise(8, n_images=40))).bundle
+    bundle = adjusted(calibrated(0.05 * lasting(8, 0.0))).bundle
 
     once = (USUAL.center_bias / bundle.sigma) ** 2 * bundle.independent_noise
     # Of fewer images each has a posture of its own; of more, postures repeat.
