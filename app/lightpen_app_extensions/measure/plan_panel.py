@@ -14,9 +14,7 @@ from lightpen.record.exports import save_new
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.look.words import set_tooltip
 from lightpen_app.widgets.bars import Question, QuestionBar
-from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app_extensions.measure.service import MeasureService
@@ -60,18 +58,34 @@ class PlanPanel(Translated, QWidget):
         self._question = QuestionBar()
         self._question.set_words(self._leaving)
         self._start, self.of_part, self.of_feature = (QWidget() for _ in range(3))
-        self._open, self._teach, self._plate = (PushButton() for _ in range(3))
-        self._texts = tuple(text_label(TextSize.LEAD) for _ in range(3))
-        self._kind = ChoiceField()
+        self._open = self.make_button(self.tr("Open a plan..."), self.pick_plan)
+        self._teach = self.make_button(self.tr("Teach a plan"), self._on_teach_clicked)
+        plate = self.tr("Try the simulated plate")
+        self._plate = self.make_button(plate, self._on_plate_clicked)
+        texts = (
+            self.tr("Measure by a plan in a YAML file."),
+            self.tr(
+                "Features are recognised while they are probed; save them as a plan "
+                "at the end."
+            ),
+            self.tr("Ten features of a plate that the simulated operator probes."),
+        )
+        name = self.tr("Kind of the feature that is probed")
+        self._kind = self.say(ChoiceField(), name=name)
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
-        self._save_plan, self._export, self._other = (PushButton() for _ in range(3))
+        tip = self.tr("Save a plan with the measured features as nominals.")
+        save = self.tr("Save plan...")
+        self._save_plan = self.make_button(save, self._on_save_plan_clicked, tip=tip)
+        self._export = self.make_button(self.tr("Export..."), self._on_export_clicked)
+        self._other = self.make_button(self.tr("Other plan"), self._on_other_clicked)
 
         # Layout
         vertical_layout(self, self._question, (self._start, 1))
         rows = vertical_layout(self._start, 1, spacing=3 * GRID, margins=4 * GRID)
         buttons = self._open, self._teach, self._plate
-        for button, words in zip(buttons, self._texts, strict=True):
+        for button, text in zip(buttons, texts, strict=True):
+            words = self.say(text_label(TextSize.LEAD), text)
             button.setProperty("inviting", button is self._open)
             button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
             horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
@@ -81,14 +95,8 @@ class PlanPanel(Translated, QWidget):
         horizontal_layout(self.of_part, *of_part)
 
         # Connections
-        self._open.clicked.connect(self.pick_plan)
-        self._teach.clicked.connect(self._on_teach_clicked)
-        self._plate.clicked.connect(self._on_plate_clicked)
-        self._other.clicked.connect(self._on_other_clicked)
         self._question.agreed.connect(self._leave_plan)
         self._kind.activated.connect(self._on_kind_chosen)
-        self._save_plan.clicked.connect(self._on_save_plan_clicked)
-        self._export.clicked.connect(self._on_export_clicked)
 
         self._retranslate()
 
@@ -130,30 +138,9 @@ class PlanPanel(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._open.setText(self.tr("Open a plan..."))
-        self._teach.setText(self.tr("Teach a plan"))
-        self._plate.setText(self.tr("Try the simulated plate"))
-        texts = (
-            self.tr("Measure by a plan in a YAML file."),
-            self.tr(
-                "Features are recognised while they are probed; save them as a plan "
-                "at the end."
-            ),
-            self.tr("Ten features of a plate that the simulated operator probes."),
-        )
-        for label, text in zip(self._texts, texts, strict=True):
-            label.setText(text)
-        self._other.setText(self.tr("Other plan"))
-        self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))
-        self._save_plan.setText(self.tr("Save plan..."))
-        set_tooltip(
-            self._save_plan,
-            self.tr("Save a plan with the measured features as nominals."),
-        )
-        self._export.setText(self.tr("Export..."))
 
     def pick_plan(self) -> None:
         """Let the user choose the file of a plan."""

@@ -71,14 +71,6 @@ def is_held(state: SessionState) -> bool:
     return is_holding and len(touching.held) >= SETTLING
 
 
-@dataclass(frozen=True, eq=False)
-class CheckResult:
-    """What a check found."""
-
-    bands: tuple[Band, ...]
-    grade: Grade
-
-
 class VerifyPresenter(QObject):
     """Computes the view from the status of runner, camera and station."""
 
@@ -90,7 +82,8 @@ class VerifyPresenter(QObject):
         self._service = service
         self._selection, self._tips = workbench.selection, workbench.library
         self._verification, self._live = run, workbench.live
-        self._results: dict[str, CheckResult] = {}  # of the present tip, by task
+        # Values and grade of the present tip, by task.
+        self._results: dict[str, tuple[tuple[Band, ...], Grade]] = {}
         self._tip_file: InputFile | None = None
 
     def view(self) -> VerifyView:
@@ -152,8 +145,7 @@ class VerifyPresenter(QObject):
         setup, state, task = self._status.setup, self._status.state, self.tasks[row]
         title, purpose = worded(task.title), worded(task.purpose)
         if setup is None or state is None or task is not setup.task:
-            result = self._results.get(task.kind)
-            bands = () if result is None else result.bands
+            bands, _ = self._results.get(task.kind, ((), None))
             return FigureValue(title, purpose, bands=bands, action=self.tr("Do now"))
         bands = bands_so_far(setup, state)
         if state.done is not None:
@@ -250,7 +242,7 @@ class VerifyPresenter(QObject):
         setup, state, found = status.setup, status.state, status.assessment
         if setup is not None and state is not None and found is not None:
             bands = bands_so_far(setup, state)
-            self._results[setup.choices.kind] = CheckResult(bands, found.grade)
+            self._results[setup.choices.kind] = bands, found.grade
 
     def _row(self, task: AnyTask) -> CheckRow:
         status, name = self._status, worded(task.title)
@@ -259,8 +251,9 @@ class VerifyPresenter(QObject):
         result = self._results.get(task.kind)
         if result is None:
             return CheckRow(name, "", Sign.RING, Tone.QUIET)
-        value = f"{self._grade_text(result.grade)} {value_text(result.bands[0])}"
-        return CheckRow(name, value, *GRADE_MARKS[result.grade])
+        bands, grade = result
+        value = f"{self._grade_text(grade)} {value_text(bands[0])}"
+        return CheckRow(name, value, *GRADE_MARKS[grade])
 
     def _grade_text(self, grade: Grade) -> str:
         """Return a grade; REPEAT refers to the verification, not to a swing."""

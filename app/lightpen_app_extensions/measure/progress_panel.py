@@ -18,7 +18,6 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.words import set_tooltip
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.bars import Question, QuestionBar, ReasonBar, usual_reasons
 from lightpen_app.widgets.controls import PushButton
@@ -72,10 +71,18 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._reason = ReasonBar()
         self._instruction = FittedText(TextSize.TITLE)
         self._instruction.setMinimumHeight(4 * GRID)
-        self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
-        self._report = PushButton()
+        self._act = PushButton()
+        self._start_over = self.make_button(
+            self.tr("Start over"),
+            self._on_start_over_clicked,
+            tip=self.tr("Discard all points, and start with the current tip."),
+        )
+        tip = self.tr("Use the tip with a reason")
+        self._accept = self.make_button(self.tr("Accept..."), self._ask_reason, tip=tip)
+        self._report = self.make_button(self.tr("Report..."), self._on_report_clicked)
         self._print_report = PrintReportControl(workbench.save_place, self)
-        self._undo = PushButton()
+        tip = self.tr("Discard the last point of the current task.")
+        self._undo = self.make_button(self.tr("Undo point"), self._undo_point, tip=tip)
         self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
@@ -83,7 +90,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
         self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
-        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
+        bar = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
+        self._progress = self.say(bar, self.tr("Progress"))
 
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
@@ -100,11 +108,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         # Connections
         self._run.refused.connect(self._on_refused)
         self._act.clicked.connect(self.toggle_pause)
-        self._undo.clicked.connect(self._on_undo_clicked)
-        self._start_over.clicked.connect(self._on_start_over_clicked)
         self._question.agreed.connect(self._begin_anew)
-        self._accept.clicked.connect(self._ask_reason)
-        self._report.clicked.connect(self._on_report_clicked)
         self._print_report.failed.connect(partial(workbench.notifications.notify, self))
         self._print_report.saved.connect(self._on_saved)
         self._reason.given.connect(self._on_reason_given)
@@ -165,17 +169,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
             self.tr("Do not accept"),
             usual_reasons(),
         )
-        self._accept.setText(self.tr("Accept..."))
-        set_tooltip(self._accept, self.tr("Use the tip with a reason"))
-        self._report.setText(self.tr("Report..."))
-        self._undo.setText(self.tr("Undo point"))
-        set_tooltip(self._undo, self.tr("Discard the last point of the current task."))
-        self._start_over.setText(self.tr("Start over"))
-        set_tooltip(
-            self._start_over,
-            self.tr("Discard all points, and start with the current tip."),
-        )
-        self._progress.setAccessibleName(self.tr("Progress"))
 
     def _starting_over(self) -> Question:
         return Question(
@@ -187,7 +180,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
     def _begin_anew(self) -> None:
         self._runner.ask(lambda workflow: workflow.start_over())
 
-    def _on_undo_clicked(self) -> None:
+    def _undo_point(self) -> None:
         self._runner.ask(lambda workflow: workflow.undo())
 
     def _on_report_clicked(self) -> None:

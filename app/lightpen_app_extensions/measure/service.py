@@ -25,8 +25,7 @@ from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
-from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
-from lightpen_app.widgets.controls import PushButton
+from lightpen_app.steps.simulator_controls import SimulatorControls
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import RunView
@@ -309,9 +308,15 @@ class ProbingSimulatorControls(SimulatorControls):
         self.setProperty("area", "panel")
 
         # Widgets
-        self._touch = PushButton(checkable=True)
+        self.say(self, self.tr("Simulated pen"))
+        self._touch = self.make_button(
+            self.tr("Let the simulated operator probe"),
+            tip=self.tr("Probes all tasks automatically."),
+            checkable=True,
+        )
         self._touch.setProperty("inviting", True)
-        self._lift = QToolButton()
+        lift, tip = self.tr("Lift"), self.tr("Take the tip away for a moment.")
+        self._lift = self.say(QToolButton(), lift, tip=tip)
 
         # Layout
         margins = (GRID, GRID // 2, GRID, GRID // 2)
@@ -322,24 +327,11 @@ class ProbingSimulatorControls(SimulatorControls):
         self._touch.toggled.connect(service.set_touching)
         self._lift.clicked.connect(self._on_lift_clicked)
 
-        self._retranslate()
         self._follow_connection()
 
     def stop(self) -> None:
         """Release the simulated operator."""
         self._touch.setChecked(False)
-
-    @override
-    def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("Simulated pen"))
-        set_words(
-            self._touch,
-            self.tr("Let the simulated operator probe"),
-            self.tr("Probes all tasks automatically."),
-        )
-        set_words(
-            self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
-        )
 
     @override
     def _follow_connection(self) -> None:

@@ -52,11 +52,11 @@ class PenPanel(Translated, QWidget):
 
         # Widgets
         self._verdict = SignLabel()
-        self._left_out, self._head = (
-            text_label(TextSize.SMALL, Tone.QUIET) for _ in range(2)
-        )
+        self._left_out = text_label(TextSize.SMALL, Tone.QUIET)
         self._left_out.setWordWrap(True)
-        self._table = NumberTable()
+        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
+        self._head = self.say(text_label(TextSize.SMALL, Tone.QUIET), head)
+        self._table = self.say(NumberTable(), head)
 
         # Layout
         cells = self._verdict, self._left_out, self._head, self._table, 1
@@ -91,9 +91,6 @@ class PenPanel(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
-        self._head.setText(head)
-        self._table.setAccessibleName(head)
         self._refresh()
 
     def _on_workbench_changed(self) -> None:

@@ -409,17 +409,11 @@ class VerificationListener(Protocol):
         """Receive the end of a fault."""
 
 
-_HAPPENED = {
-    ProbingEventKind.RECORDED: SessionEventKind.RECORDED,
-    ProbingEventKind.BROKEN_OFF: SessionEventKind.BROKEN_OFF,
-}
-
-
 def event_kinds(
     before: SessionState | None, transition: SessionTransition
 ) -> list[SessionEventKind]:
     """Return the events of the touches by one more image."""
-    happened = [_HAPPENED[event.what] for event in transition.events]
+    happened = [SessionEventKind(event.what) for event in transition.events]
     if before is not None and _is_known(transition.state) and not _is_known(before):
         happened.append(SessionEventKind.KNOWN)
     return happened

@@ -2770,7 +2770,7 @@
     </message>
     <message>
         <source>NO PLAN YET</source>
-        <translation>尚无方案</translation>
+        <translation>尚无计划</translation>
     </message>
     <message>
         <source>Feature {0} of {1}</source>

@@ -46,6 +46,8 @@ from lightpen_extensions.measure.commands.touched import (
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
 from lightpen_extensions.measure.measuring.report import EXPORTS, ResultRow, ResultTable
+from lightpen_extensions.measure.tasks.drift import DRIFT
+from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
@@ -53,7 +55,6 @@ from lightpen_extensions.measure.tasks.probed_point import (
     point_entries,
 )
 from lightpen_extensions.measure.tasks.registry import (
-    TASKS,
     AnyTask,
     measure_artefacts,
     size_table,
@@ -90,12 +91,7 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
     add_ball(
         parser, "default: that of the calibrated tip, if known; 0: no compensation"
     )
-    parser.add_argument(
-        "--drift",
-        type=Path,
-        metavar="DRIFT.json",
-        help="record of `verify drift` from the same session; U includes the drift",
-    )
+    _add_drift(parser)
     parser.add_argument(
         "--export",
         type=Path,
@@ -161,17 +157,10 @@ def _measured(
         conditions = replace(conditions, ball_diameter=ball)
     choices = VerificationChoices(PART.kind, plan)
     found = PART.measure(runs, conditions, choices)
-    judged = found.assessment
-    tables = PART.tables(found, conditions)
-    rule = rule_of(choices, conditions.limits)
-    remarks = conditions.instrument.remarks
-    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
-    entries = PART.entries(found, measured.instrument)
-    record = measured.record(given, PART.kind, entries, judged, rule)
     for path, export in exports.items():
         write_whole(path, export.encoded(found.part))
-    keep_record(given, record, measured.calibration, measured.origin)
-    return verdict_status(given, judged.grade)
+    tables = PART.tables(found, conditions)
+    return _concluded(given, measured, PART, found, tables, choices)
 
 
 def _export_of(path: Path) -> FileFormat:
@@ -218,8 +207,10 @@ FACE_SIDES = {"outer": Side.OUTSIDE, "inner": Side.INSIDE}
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify`` and its tasks."""
     kinds = parser.add_subparsers(required=True, metavar="TASK")
-    for task in TASKS:
-        _add_task(kinds.add_parser(task.command, help=task.summary), task)
+    check = "the cone, probed in new postures"
+    _add_fixed_point(kinds.add_parser("fixed-point", help=check))
+    motion = "motion of camera or cone during a session"
+    _add_drift_check(kinds.add_parser("drift", help=motion))
     _add_circle(kinds.add_parser("circle", help="a ring of certified radius"))
     _add_length(kinds.add_parser("length", help="a certified length"))
     add_verify_pen(kinds.add_parser("pen", help="LED stability over several swings"))
@@ -228,20 +219,24 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
-    parser.set_defaults(run=_verify_task, task=task, ball_diameter=None)
-    add_runs(parser, task.run_help)
-    if task.compares_nominal_tip:
-        parser.add_argument(
-            "--nominal-tip",
-            type=finite,
-            nargs=3,
-            metavar=("X", "Y", "Z"),
-            help="nominal tip centre, pen frame, mm",
-        )
-    if task.counts_drift:
-        _add_drift(parser)
-    _add_common(parser, *task.limits)
+def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_verify_task, task=FIXED_POINT, ball_diameter=None)
+    add_runs(parser, "points in the cone, each in another posture")
+    parser.add_argument(
+        "--nominal-tip",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="nominal tip centre, pen frame, mm",
+    )
+    _add_drift(parser)
+    _add_common(parser, *FIXED_POINT.limits)
+
+
+def _add_drift_check(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_verify_task, task=DRIFT, ball_diameter=None)
+    add_runs(parser, "one visit of a fixed cone, in order of time")
+    _add_common(parser, *DRIFT.limits)
 
 
 def _add_circle(parser: argparse.ArgumentParser) -> None:
@@ -338,7 +333,7 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
 @printing
 def _verify_task(given: argparse.Namespace) -> int:
     task: AnyTask = given.task
-    measured = given_runs(given, is_pooled=task.is_pooled)
+    measured = given_runs(given, is_pooled=task is FIXED_POINT)
     found = task.measure(measured.touches, measured.conditions, VerificationChoices())
     tables = task.tables(found, measured.conditions)
     return _concluded(given, measured, task, found, tables)
@@ -379,13 +374,14 @@ def _concluded(
     task: AnyTask,
     found: Found,
     tables: Sequence[ResultTable],
+    choices: VerificationChoices | None = None,
 ) -> int:
     """Print, keep and return what was found."""
-    judged = found.assessment
-    if judged.is_accepted and measured.n_of_calibration:
+    judged, limits = found.assessment, measured.conditions.limits
+    if choices is None and judged.is_accepted and measured.n_of_calibration:
         n_own = measured.n_of_calibration
         judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
-    rule = rule_in_words(measured.conditions.limits)
+    rule = rule_in_words(limits) if choices is None else rule_of(choices, limits)
     remarks = measured.instrument.remarks
     print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
     entries = task.entries(found, measured.instrument)

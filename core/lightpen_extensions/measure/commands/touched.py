@@ -37,7 +37,6 @@ from lightpen_extensions.measure.probing.sources import (
     ImageLocation,
     PenCameras,
     ProbingRun,
-    RecordedConditions,
     instrument_of,
     observe_place,
     read_viewers,
@@ -109,7 +108,7 @@ class MeasuredRuns:
     files: tuple[Path, ...]
     viewers: PenCameras
     pen_file: Path
-    recorded: RecordedConditions | None  # if the images are of a record
+    recorded: ImageLocation | None  # of a record
 
     @property
     def instrument(self) -> Instrument:
@@ -166,7 +165,7 @@ class MeasuredRuns:
 
     def _conditions(self) -> dict[str, Any]:
         """Return operator and environment as far as the images state them."""
-        if self.recorded is None:
+        if self.recorded is None or self.recorded.conditions is None:
             return {}
         now = self.recorded.conditions
         return {
@@ -217,8 +216,9 @@ def measure_runs(
     files = tuple(file for place in found for file in place.files)
     files += tuple(centers)
     require_other_file(options.json, *files)
-    recorded = next((each.recorded for each in found if each.recorded), None)
-    temperature_c = None if recorded is None else recorded.conditions.temperature_c
+    recorded = next((each for each in found if each.conditions), None)
+    environment = None if recorded is None else recorded.conditions
+    temperature_c = None if environment is None else environment.temperature_c
     bending = bending_of(calibration, getattr(options, "data", None))
     instrument = instrument_of(
         calibration, viewers, pen, pen_file, temperature_c, bending

@@ -1,6 +1,6 @@
 """Measurement of a part: features, alignment and characteristics of a plan."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -22,6 +22,7 @@ from lightpen_extensions.measure.measuring.alignment import (
 )
 from lightpen_extensions.measure.measuring.characteristics import (
     DEVIATIONS,
+    FORMS,
     Measured,
     Value,
     evaluate,
@@ -57,6 +58,8 @@ SOLID = {FeatureKind.SPHERE, FeatureKind.CYLINDER, FeatureKind.CONE}
 OUTLYING = 6.0  # of their noise, which is added to both
 MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
 LYING = 0.2  # mm from a plane, of a point or line that was probed on it
+FREE = 0.5  # singular value of residuals that a fit leaves free; the others are 0
+TINY, EXACT = 1e-12, 1e-3  # mm^2; relative, of the variance of form
 ROUNDS = 3  # of alignments by points whose normals are stated in the frame they give
 
 
@@ -117,6 +120,7 @@ def measure_part(
     were_recognised = {each.name for each in plan.features if each.kind is None}
     plan = _with_kinds(plan, touches)
     probed = {each.name: _of_centres(each, touches) for each in plan.features}
+    with_form = _with_form(touches, probed.values())
     surfaces = _surfaces(plan, probed, touches, were_recognised)
     alignment = _aligned(plan, surfaces)
     features = {}
@@ -127,9 +131,15 @@ def measure_part(
         nominal = each.planned.nominal
         features[name] = Measured(surface, in_part, each.fit, each.points, nominal)
     results = tuple(
-        _result(planned, features, touches, limits) for planned in plan.characteristics
+        _result(
+            planned,
+            features,
+            touches if planned.quantity in FORMS else with_form,
+            limits,
+        )
+        for planned in plan.characteristics
     )
-    return MeasuredPart(plan, touches, features, alignment, results)
+    return MeasuredPart(plan, with_form, features, alignment, results)
 
 
 def _of_centres(planned: PlannedFeature, touches: PartTouches) -> ProbedFeature:
@@ -140,6 +150,44 @@ def _of_centres(planned: PlannedFeature, touches: PartTouches) -> ProbedFeature:
     if fit.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
         quantity = along_touches(quantity, touches.points_cam[at])
     return ProbedFeature(planned, fit, at, quantity, touches.points(at))
+
+
+def _with_form(touches: PartTouches, probed: Iterable[ProbedFeature]) -> PartTouches:
+    """Return touches as uncertain as the form of the part makes its features by them.
+
+    Few points miss the feature of a whole surface by its form. The variance of form is
+    what all residuals along normals show beyond the covariance of the points.
+    """
+    squares, variances, at = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=int)]
+    for each in probed:
+        if each.kind is FeatureKind.POINT:
+            continue
+        columns = touches.columns(each.at)
+        at.append(columns)
+        if each.kind is FeatureKind.LINE:
+            continue  # the hand chooses where across it
+        normals = slice(None, None, each.fit.distances.shape[1])
+        follow = each.fit.distances_by_points[normals]
+        axes, sizes, _ = np.linalg.svd(follow, full_matrices=False)
+        free = axes[:, sizes > FREE]
+        rows = free.T @ follow
+        spread = rows @ touches.covariance[np.ix_(columns, columns)] @ rows.T
+        own, turn = np.linalg.eigh(spread)
+        squares.append((turn.T @ free.T @ each.fit.distances[:, 0]) ** 2)
+        variances.append(own.clip(min=TINY))
+    square, variance = np.concatenate(squares), np.concatenate(variances)
+    n = len(square)
+    expected = n**2 / (n + 2)  # less than n, as n squares leave a variance uncertain
+    low, high = 0.0, float(square.sum()) / max(expected, TINY)
+    if np.sum(square / variance) <= expected:
+        return touches
+    while high - low > EXACT * high:
+        middle = (low + high) / 2
+        is_more = np.sum(square / (variance + middle)) > expected
+        low, high = (middle, high) if is_more else (low, middle)
+    covariance = touches.covariance.copy()
+    covariance[(np.concatenate(at),) * 2] += high
+    return replace(touches, covariance=covariance)
 
 
 def _surfaces(

@@ -322,7 +322,9 @@ def outline_of(one: Measured) -> list[FloatArray]:
         case FeatureKind.LINE:
             return [origin + np.array(along)]
         case FeatureKind.PLANE:
-            return [origin + reach * np.array(CORNERS) @ frame[:, :2].T]
+            points = one.points.values.reshape(-1, 3) - origin
+            half = np.abs(points @ frame[:, :2]).max(axis=0)
+            return [origin + half * np.array(CORNERS) @ frame[:, :2].T]
         case FeatureKind.CIRCLE:
             return [_ring(origin, frame, sizes[0])]
         case FeatureKind.SPHERE:
@@ -353,9 +355,7 @@ def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:
 
 
 def _reach(one: Measured) -> float:
-    """Return the half extent of the points, along an axis or in all directions."""
+    """Return the half extent of the points along an axis, mm."""
     points = one.points.values.reshape(-1, 3)
-    away = points - points.mean(axis=0)
-    if one.kind is not FeatureKind.PLANE:
-        away = away @ one.surface.quantity.values[AXIS, None]
-    return float(np.linalg.norm(away, axis=1).max())
+    along = (points - points.mean(axis=0)) @ one.surface.quantity.values[AXIS]
+    return float(np.abs(along).max())

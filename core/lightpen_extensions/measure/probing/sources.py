@@ -78,14 +78,6 @@ class PenCameras:
         return tuple(file.sha256 for file in self.files)
 
 
-@dataclass(frozen=True)
-class RecordedConditions:
-    """Who took images of a record, and in what environment."""
-
-    operator: str
-    conditions: Assumptions
-
-
 @dataclass(frozen=True, eq=False)
 class ImageLocation:
     """Images of touches, and the files that they bring if they are a record's."""
@@ -98,7 +90,8 @@ class ImageLocation:
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)  # (M, 3), stray light, px
     held: tuple[tuple[int, StillFrames], ...] = ()  # points of a record, with runs
-    recorded: RecordedConditions | None = None
+    operator: str = ""  # who took images of a record, and in what environment
+    conditions: Assumptions | None = None
 
     def of_bits(self, bits: int | None) -> "ImageLocation":
         """Return the place with images of so many bits; see `ImageSource.of_bits`."""
@@ -147,9 +140,8 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
             pen_file=own.pen_file,
             masks=own.masks,
             held=held_in(record),
-            recorded=RecordedConditions(
-                record.header.operator, recorded_assumptions(record.header.settings)
-            ),
+            operator=record.header.operator,
+            conditions=recorded_assumptions(record.header.settings),
         )
     is_simulated = is_simulated_recording(where[0])
     origin = Origin.SIMULATED if is_simulated else Origin.RECORDED

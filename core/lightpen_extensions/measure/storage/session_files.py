@@ -328,7 +328,7 @@ def abandon_interrupted(
                 raise unreadable(path, WHAT, error) from error
             return
         root, files = path.parents[2], []
-        for name in written_since(root, under_way).files:
+        for name in written_since(root, under_way):
             with suppress(FileError):
                 files.append(hashed(root / name))
         record = conclusion_record(

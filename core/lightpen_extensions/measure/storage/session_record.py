@@ -274,18 +274,13 @@ def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
     )
 
 
-@dataclass(frozen=True)
-class SessionFiles:
-    """Records of a verification with their tasks, the oldest first."""
+def written_since(folder: Path, under_way: VerificationCheckpoint) -> dict[str, str]:
+    """Return the records of a verification that is under way: file names and tasks.
 
-    files: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = ()
-
-
-def written_since(folder: Path, under_way: VerificationCheckpoint) -> SessionFiles:
-    """Return the files written of a verification that is under way."""
+    The oldest is the first.
+    """
     session = under_way.began.isoformat(timespec="seconds")
-    since: list[tuple[str, str]] = []
+    since: dict[str, str] = {}
     for file in numbered_files(folder):
         try:
             record = parse_own_json(read_bytes(file, WHAT, LARGEST_RECORD), _OfSession)
@@ -294,8 +289,8 @@ def written_since(folder: Path, under_way: VerificationCheckpoint) -> SessionFil
         if record.created < under_way.began.replace(microsecond=0):
             break
         if record.session == session:
-            since.insert(0, (file.name, record.verification))
-    return SessionFiles(*zip(*since, strict=True)) if since else SessionFiles()
+            since[file.name] = record.verification
+    return dict(reversed(since.items()))
 
 
 class _OfSession(Struct):
@@ -309,7 +304,7 @@ def _is_concluded(found: InterruptedVerification) -> bool:
     if found.under_way is None:
         return False
     since = written_since(found.path.parents[2], found.under_way)
-    if CONCLUSION not in since.kinds:
+    if CONCLUSION not in since.values():
         return False
     remove_note(found.path)
     return True
@@ -361,7 +356,7 @@ def resume_verification(
     now = under_way.n_runs + 1
     state = touch_again(setup, state, [still for n, still in held if n == now])
     root = path.parents[2]
-    files = tuple(root / name for name in written_since(root, under_way).files)
+    files = tuple(root / name for name in written_since(root, under_way))
     return ResumedVerification(under_way, tip, setup, state, files)
 
 

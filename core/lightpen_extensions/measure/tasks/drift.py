@@ -210,8 +210,6 @@ def _instruction(choices: VerificationChoices, progress: TaskProgress) -> Messag
 
 DRIFT = VerificationTask(
     kind="drift",
-    summary="motion of camera or cone during a session",
-    run_help="one visit of a fixed cone, in order of time",
     title=message("drift.title"),
     purpose=message("drift.purpose"),
     first=message("drift.first"),
@@ -229,6 +227,5 @@ DRIFT = VerificationTask(
     instruction=_instruction,
     screen=_screen,
     newness=(0.0, 0.0),
-    counts_drift=False,
     shows_postures=True,
 )

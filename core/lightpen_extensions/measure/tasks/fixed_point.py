@@ -105,7 +105,7 @@ def measure_fixed_point(
 
     Raises `CalibrationError` if there are too few points at one place.
     """
-    instrument = conditions.instrument.seated
+    instrument, nominal_tip = conditions.instrument.seated, conditions.nominal_tip
     touches = [point.seated for _, points in runs for point in points]
     kept, left_out = _at_one_place(touches)
     calibrated = scatter_of(kept)
@@ -119,7 +119,9 @@ def measure_fixed_point(
         touches=kept,
         left_out=left_out,
         calibrated=calibrated,
-        nominal=nominal_scatter(kept, instrument, conditions.nominal_tip),
+        nominal=None
+        if nominal_tip is None
+        else scatter_of([with_tip(each, instrument, nominal_tip) for each in kept]),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
         expected_deviation=expected,
         half_range_uncertainty=_half_range_by_noise(covariance),
@@ -146,17 +148,6 @@ def _steady(scatter: Scatter) -> Message:
 def scatter_of(touches: Sequence[ProbedPoint]) -> Scatter:
     """Return the coordinates of touches."""
     return Scatter(np.array([touch.point_cam for touch in touches]))
-
-
-def nominal_scatter(
-    touches: Sequence[ProbedPoint],
-    instrument: Instrument,
-    nominal_tip: FloatArray | None,
-) -> Scatter | None:
-    """Return the coordinates of touches with the nominal tip; None if not known."""
-    if nominal_tip is None:
-        return None
-    return scatter_of([with_tip(each, instrument, nominal_tip) for each in touches])
 
 
 def _at_one_place(
@@ -352,8 +343,6 @@ def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:
 
 FIXED_POINT = VerificationTask(
     kind="fixed point",
-    summary="the cone, probed in new postures",
-    run_help="points in the cone, each in another posture",
     title=message("fixed-point.title"),
     purpose=message("fixed-point.purpose"),
     first=message("task.probe-cone"),
@@ -372,7 +361,5 @@ FIXED_POINT = VerificationTask(
     instruction=lambda choices, progress: message("session.touch-cone"),
     screen=lambda progress: without_others(progress.points),
     newness=(NEW_POSTURE, ANY),
-    is_pooled=True,
-    compares_nominal_tip=True,
     shows_postures=True,
 )

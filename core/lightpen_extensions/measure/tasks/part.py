@@ -420,8 +420,6 @@ def _missing(
 
 PART = VerificationTask(
     kind=MEASURED_PART,
-    summary="a part by a plan",
-    run_help="probed points of a feature",
     title=message("part.title"),
     purpose=message("part.title"),
     first=message("part.first"),

@@ -142,8 +142,6 @@ class VerificationTask(Generic[FoundT]):
     """One task of a verification."""
 
     kind: TaskKind
-    summary: str  # help text of the command
-    run_help: str  # help text of one run
     title: Message  # a noun
     purpose: Message  # instruction shown beside the check box of the task
     first: Message  # what to do, in few words
@@ -172,18 +170,10 @@ class VerificationTask(Generic[FoundT]):
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, VerificationChoices], object] | None = None
     judges_points: bool = True  # whether values are shown amid a run
-    is_pooled: bool = False  # all images of the command are one run
-    counts_drift: bool = True  # whether U counts how far the camera moved
-    compares_nominal_tip: bool = False
     shows_postures: bool = False  # whether the window shows how the pen was held
 
     def __str__(self) -> str:
         return self.kind
-
-    @property
-    def command(self) -> str:
-        """Its name on the command line."""
-        return self.kind.replace(" ", "-")
 
     def done(self, choices: VerificationChoices, progress: TaskProgress) -> float:
         """Return the completed fraction of the current run, 0 to 1."""

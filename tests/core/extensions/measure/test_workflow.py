@@ -307,11 +307,10 @@ def test_the_images_of_touches_say_which_touch_they_are_of(trace: Trace) -> None
     trace.touch(leant(4)[2])
     (run,) = (trace.folder / SIMULATED / VERIFICATIONS / TOUCHES).iterdir()
     place = touch_place((str(run),))
-    held, recorded = place.held, place.recorded
+    held = place.held
     trace.workflow.shut_down()
-    assert recorded is not None
-    assert recorded.operator == trace.prepared.names.operator
-    assert recorded.conditions == trace.prepared.assumptions_today
+    assert place.operator == trace.prepared.names.operator
+    assert place.conditions == trace.prepared.assumptions_today
 
     # A touch that is taken back counts no more.
     numbers = [[frame.name for frame in still.frames] for _, still in held]
