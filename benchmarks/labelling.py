@@ -8,7 +8,8 @@ from benchmarks.rows import Row
 from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.labelling.labels import Labels, LabelStatus, label_images
+from lightpen.detection.labelling.labels import Labels, label_images
+from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots
 from lightpen.model.ellipse import disc_images
 from lightpen.model.rigid import rotation_from_vector
@@ -97,7 +98,7 @@ def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> Rando
 
 def outcome(labels: Labels, view: RandomView) -> str:
     """Return whether an image was labelled right, wrong, or refused."""
-    if labels.reason is not LabelStatus.LABELLED:
+    if labels.reason is not Reason.NONE:
         return "refused"
     named = labels.spot >= 0
     right = np.array_equal(labels.spot[named], view.spot[named])

@@ -27,13 +27,13 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.detection.labelling.labels import Labels, label_spots
 from lightpen.detection.observations import observe_centers, observe_images
 from lightpen.detection.pen_detection import (
-    Followed,
     PenDetection,
     detect_from_centers,
     detect_pen,
     follow_spots,
 )
 from lightpen.detection.pose import fit_paper_poses, fit_poses
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.pivot.pivot import fit_pivot, fit_two_stage
@@ -296,15 +296,16 @@ def _label_times() -> _LabelTimes:
     rng = np.random.default_rng(3)
     views = [random_view(rng, n_missing=4, n_lamps=5) for _ in range(N_VIEWS)]
     turns = rotation_from_vector(rng.normal(0, TURN_ERROR, (N_VIEWS, 3)))
-    middle, unseen = PEN.leds.mean(axis=0), np.full(PEN.n_leds, np.nan)
+    middle, unseen = PEN.leds.mean(axis=0), np.full((PEN.n_leds, 2), np.nan)
 
     def start(view: RandomView) -> Labels:
         return label_spots(view.spots, CAMERA, PEN)
 
-    def track(view: RandomView, turn: FloatArray) -> Followed | None:
+    def track(view: RandomView, turn: FloatArray) -> PenDetection | None:
         R = turn @ view.R
         t = view.t + (view.R - R) @ middle
-        return follow_spots(view.spots, CAMERA, PEN, R, t, unseen)
+        before = PenDetection(unseen, unseen, Reason.NONE, R, t)
+        return follow_spots(view.spots, CAMERA, PEN, before)
 
     starting = [elapsed_ms(partial(start, view)) for view in views]
     tracking = [

@@ -25,7 +25,7 @@ References
 
 from functools import lru_cache
 from math import ceil, log, pi, sqrt
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -83,23 +83,15 @@ MAX_RELATIVE_DENT = 0.015  # of the shorter semi-axis
 DENT_SIGMAS = 3.5
 
 
-class EdgeFit(NamedTuple):
-    """The outline of a disc."""
-
-    center: FloatArray  # (2,), px
-    # (2, 2), covariance of the area, px^2; eigenvalues a^2 / 4 and b^2 / 4.
-    shape: FloatArray
-    sigma: float  # standard deviation of the blur, px
-    is_whole: bool  # whether no part of the rim lies off the ellipse, nor is missing
-
-
 class EdgeFits(NamedTuple):
-    """The outlines of N discs, as `EdgeFit`; NaN without a sharp enough edge."""
+    """The outlines of N discs; NaN without a sharp enough edge."""
 
-    centers: FloatArray  # (N, 2)
-    shapes: FloatArray  # (N, 2, 2)
-    sigmas: FloatArray  # (N,)
-    are_whole: BoolArray  # (N,)
+    centers: FloatArray  # (N, 2), px
+    # (N, 2, 2), covariances of the areas, px^2; eigenvalues a^2 / 4 and b^2 / 4.
+    shapes: FloatArray
+    sigmas: FloatArray  # (N,), standard deviations of the blur, px
+    # (N,), whether no part of the rim lies off the ellipse, nor is missing
+    are_whole: BoolArray
 
 
 class EdgeStarts(NamedTuple):
@@ -111,6 +103,12 @@ class EdgeStarts(NamedTuple):
     sigmas: FloatArray
     # (N, 2), from the disc's centre to the region's in the previous image, px.
     offsets: FloatArray
+
+    @classmethod
+    def anew(cls, centers: FloatArray, shapes: FloatArray) -> Self:
+        """Return starts of discs that no previous image shows."""
+        nowhere = np.full((len(centers), 2), np.nan)
+        return cls(centers, shapes, nowhere[:, 0], nowhere)
 
 
 class _Ellipses(NamedTuple):
@@ -150,16 +148,6 @@ class _Edges(NamedTuple):
     blurs: FloatArray  # (D,), by how much the blur is wider than supposed, px
     are_dark: BoolArray  # (D,), whether rays meet no light inside the rim
     are_lit: BoolArray  # (D,), whether there is light inside at all
-
-
-def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | None:
-    """Fit the rim of one disc, see `fit_edges`."""
-    nowhere = np.full((1, 2), np.nan)
-    starts = EdgeStarts(center[None], shape[None], nowhere[:, 0], nowhere)
-    centers, shapes, sigmas, are_whole = fit_edges(image, starts)
-    if np.isnan(sigmas[0]):
-        return None
-    return EdgeFit(centers[0], shapes[0], float(sigmas[0]), bool(are_whole[0]))
 
 
 def fit_edges(image: Image, starts: EdgeStarts) -> EdgeFits:

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import ceil, cos, floor
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,11 +25,10 @@ from lightpen.detection.labelling.constellation import (
 from lightpen.detection.labelling.labels import (
     MAX_RMS_OF_FEWEST_AMONG_OTHERS,
     Labels,
-    LabelStatus,
     label_spots,
 )
 from lightpen.detection.pixel_box import PixelBox
-from lightpen.detection.pose import MIN_POSE_LEDS, ImagePose, fit_pose
+from lightpen.detection.pose import MIN_POSE_LEDS, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason
 from lightpen.detection.robust_residuals import CAUCHY_WIDTH
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
@@ -47,22 +45,6 @@ MAX_SIGMA = 0.3  # px
 STRAY = (0.3, 1.0)  # px, from its LED, least and most, if four standard deviations
 MAX_GROWTH = 1.5  # of an area from image to image
 MAX_OFF_CENTER = 0.5  # radii, of a merged or cut spot from its LED
-
-_REASONS = {  # of sharp spots without a pose
-    LabelStatus.LABELLED: Reason.TOO_FEW_LEDS,  # that are whole
-    LabelStatus.NO_SPOTS: Reason.EMPTY,
-    LabelStatus.TOO_FEW: Reason.TOO_FEW_LEDS,
-    LabelStatus.NO_FIT: Reason.NOT_THE_PEN,
-    LabelStatus.AMBIGUOUS: Reason.AMBIGUOUS,
-}
-
-
-class Followed(NamedTuple):
-    """Labels and pose of one image."""
-
-    labels: Labels
-    seen: FloatArray  # (L, 2), ellipse centres of all labelled LEDs, px; NaN elsewhere
-    pose: ImagePose
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,16 +165,15 @@ def detect_pen(
     try:
         seen = None if before is None else before.spots
         search = partial(detect_spots, image, mask, full_scale=full_scale, before=seen)
-        if before is not None and before.has_pose and is_followed:
-            spots = search(window=_window(camera, pen, before))
-            followed = _followed(spots, camera, pen, before)
-            if followed is not None:
-                return followed
-        spots = search()
         if before is not None and before.has_pose:
-            followed = _followed(spots, camera, pen, before)
-            if followed is not None:
-                return followed
+            near = _window(camera, pen, before)
+            for window in (near, None) if is_followed else (None,):
+                spots = search(window=window)
+                followed = follow_spots(spots, camera, pen, before)
+                if followed is not None:
+                    return followed
+        else:
+            spots = search()
         labels = label_spots(spots, camera, pen)
         detection = detections_of([spots], [labels], camera)[0]
         return _fitted(detection, camera, pen)
@@ -264,47 +245,17 @@ def unseen(pen: Pen, reason: Reason) -> PenDetection:
     return PenDetection(nothing, nothing, reason)
 
 
-def _followed(
+def follow_spots(
     spots: Spots, camera: Camera, pen: Pen, before: PenDetection
 ) -> PenDetection | None:
-    """Return the detection where LEDs moved little since the image before."""
-    areas = np.full(pen.n_leds, np.nan)
-    if before.spots is not None and before.labels is not None:
-        labelled = before.labels.spot >= 0
-        areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
-    pose = before.rotation, before.translation
-    found = follow_spots(spots, camera, pen, *pose, areas)
-    if found is None:
-        return None
-    pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)
-    return PenDetection(
-        *(pixels, found.seen, Reason.NONE, *found.pose[:4]), *(spots, found.labels)
-    )
-
-
-def follow_spots(
-    spots: Spots,
-    camera: Camera,
-    pen: Pen,
-    rotation: FloatArray,
-    translation: FloatArray,
-    areas: FloatArray,
-) -> Followed | None:
-    """Return labels and pose of an image, given those of the image before.
+    """Return the detection in an image by the pose in the image before.
 
     None where anything but small motion is seen. Five LEDs are enough for a pose that
     fits them closely.
-
-    Parameters
-    ----------
-    rotation, translation : (3, 3) and (3,) array
-        cam_from_pen of the image before, mm.
-    areas : (L,) array
-        Of the spots there, px^2; NaN where an LED was not seen.
     """
     if not len(spots) or np.isfinite(spots.tiny_width):
         return None
-    x, y = camera.project(pen.leds @ rotation.T + translation).T
+    x, y = camera.project(pen.leds @ before.rotation.T + before.translation).T
     apart = np.hypot(x[:, None] - x, y[:, None] - y)
     np.fill_diagonal(apart, np.inf)
     gaps = np.hypot(x[:, None] - spots.centers[:, 0], y[:, None] - spots.centers[:, 1])
@@ -322,7 +273,8 @@ def follow_spots(
             return None
         pixels = np.where(whole[:, None], seen, np.nan)
         sigmas = np.where(whole, spots.sigmas[spot], np.nan)
-        pose = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
+        at = before.rotation, before.translation
+        pose = fit_pose(camera, pen, pixels, *at, sigmas)
         off = CAUCHY_WIDTH * pose.sigma * np.sqrt(1 / pose.weights[whole] - 1)
         stray = np.zeros_like(whole)
         stray[whole] = off > np.clip(CAUCHY_WIDTH * pose.sigma, *STRAY)
@@ -331,12 +283,14 @@ def follow_spots(
         labelled, whole = labelled & ~stray, whole & ~stray
     is_certain = np.count_nonzero(whole) >= certain_leds(pen)
     most = MAX_SIGMA if is_certain else MAX_RMS_OF_FEWEST_AMONG_OTHERS
-    growth = spots.areas[spot] / areas  # NaN where an LED was not seen
-    if np.any(whole & ((growth > MAX_GROWTH) | (growth < 1 / MAX_GROWTH))):
-        return None
-    turned = np.vdot(pose.rotation, rotation) < 1 + 2 * cos(MAX_TURN)
+    turned = np.vdot(pose.rotation, before.rotation) < 1 + 2 * cos(MAX_TURN)
     if turned or pose.sigma > most:
         return None
+    if before.spots is not None and before.labels is not None:
+        both = whole & (before.labels.spot >= 0)
+        growth = spots.areas[spot] / before.spots.areas[before.labels.spot]
+        if np.any(both & ((growth > MAX_GROWTH) | (growth < 1 / MAX_GROWTH))):
+            return None
     seen = np.where(labelled[:, None], seen, np.nan)
     # A merged or cut spot is of an LED if it is on its disc.
     if np.any(labelled & ~whole):
@@ -351,9 +305,9 @@ def follow_spots(
         R=pose.rotation,
         t=pose.translation,
         rms_px=float(pose.sigma),
-        reason=LabelStatus.LABELLED,
+        reason=Reason.NONE,
     )
-    return Followed(labels, seen, pose)
+    return PenDetection(pixels, seen, Reason.NONE, *pose[:4], spots, labels)
 
 
 def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
@@ -373,10 +327,14 @@ def _detection_of(spots: Spots, labels: Labels, seen: FloatArray) -> PenDetectio
     detection = partial(PenDetection, pixels, seen, spots=spots, labels=labels)
     if np.isfinite(spots.tiny_width):
         return detection(Reason.TOO_SMALL)
-    is_labelled = labels.reason is LabelStatus.LABELLED
+    is_labelled = labels.reason is Reason.NONE
     if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
         return detection(Reason.NONE, labels.R, labels.t)
-    return detection(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
+    return detection(
+        Reason.BLURRED
+        if spots.are_blurred
+        else labels.reason or Reason.TOO_FEW_LEDS  # that are whole
+    )
 
 
 def _n_seen(pixels: FloatArray) -> int:

@@ -17,8 +17,8 @@ References
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -76,14 +76,9 @@ class Poses:
 
     def of(self, chosen: IntArray) -> "Poses":
         """Return the poses of some images."""
-        return replace(
-            self,
-            rotations=self.rotations[chosen],
-            translations=self.translations[chosen],
-            covariances=self.covariances[chosen],
-            residuals=self.residuals[chosen],
-            weights=self.weights[chosen],
-        )
+        names = (each.name for each in fields(self) if each.name != "sigma")
+        arrays: dict[str, Any] = {name: getattr(self, name)[chosen] for name in names}
+        return replace(self, **arrays)
 
 
 class ImagePose(NamedTuple):

@@ -1,6 +1,7 @@
 """Reasons for excluding an image from a calibration."""
 
 from enum import StrEnum
+from typing import Self
 
 import cv2
 
@@ -14,62 +15,38 @@ UNFORESEEN = (ArithmeticError, ValueError, cv2.error)
 class Reason(StrEnum):
     """Reason for not using an image in the calibration."""
 
-    NONE = ""
-    UNREADABLE = "unreadable"
-    UNHANDLED = "unhandled"
-    WRONG_SIZE = "wrong size"
-    EMPTY = "empty"
-    BLURRED = "blurred"
-    TOO_FEW_LEDS = "too few LEDs"
-    TOO_SMALL = "LEDs too small"
-    NOT_THE_PEN = "spots do not fit the pen"
-    AMBIGUOUS = "ambiguous"
-    MISFIT = "LEDs do not fit"
-    SLIPPED = "tip slipped"
-    TAKEN_OUT = "taken out"  # by the user
-    OUTSIDE = "outside the part"  # of the swing that is used
-    OTHER_MOMENT = "not of the same moment"  # as that of another camera
-    COPY = "same as another image"
-    ABSENT = "no image"  # of one camera at a moment that another saw
+    words: Message  # short text; without any for `NONE`
+    shows_pen: bool  # whether such an image shows the pen, also if it takes no part
 
-    @property
-    def shows_pen(self) -> bool:
-        """Whether such an image shows the pen, also if it takes no part."""
-        return self in _OF_THE_PEN
+    def __new__(
+        cls, value: str, words: Message | None = None, shows_pen: bool = False
+    ) -> Self:
+        """Return a reason with its words."""
+        each = str.__new__(cls, value)
+        each._value_, each.shows_pen = value, shows_pen
+        each.words = words or Message("")
+        return each
 
-    @property
-    def words(self) -> Message:
-        """Short text; empty for `NONE`."""
-        return _WORDS[self]
-
-
-_OF_THE_PEN = {
-    Reason.NONE,
-    Reason.MISFIT,
-    Reason.SLIPPED,
-    Reason.TAKEN_OUT,
-    Reason.OTHER_MOMENT,
-    Reason.COPY,
-}
-
-_WORDS = {
-    Reason.UNREADABLE: message("reason.unreadable"),
-    Reason.UNHANDLED: message("reason.unhandled"),
-    Reason.WRONG_SIZE: message("reason.wrong-size"),
-    Reason.EMPTY: message("reason.empty"),
-    Reason.BLURRED: message("reason.blurred"),
-    Reason.TOO_FEW_LEDS: message("reason.too-few-leds"),
-    Reason.TOO_SMALL: message("reason.too-small"),
-    Reason.NOT_THE_PEN: message("reason.not-the-pen"),
-    Reason.AMBIGUOUS: message("reason.ambiguous"),
-    Reason.MISFIT: message("reason.misfit"),
-    Reason.SLIPPED: message("reason.slipped"),
-    Reason.TAKEN_OUT: message("reason.taken-out"),
-    Reason.OUTSIDE: message("reason.outside"),
-    Reason.OTHER_MOMENT: message("reason.other-moment"),
-    Reason.COPY: message("reason.copy"),
-    Reason.ABSENT: message("reason.absent"),
-}
+    NONE = "", None, True
+    UNREADABLE = "unreadable", message("reason.unreadable")
+    UNHANDLED = "unhandled", message("reason.unhandled")
+    WRONG_SIZE = "wrong size", message("reason.wrong-size")
+    EMPTY = "empty", message("reason.empty")
+    BLURRED = "blurred", message("reason.blurred")
+    TOO_FEW_LEDS = "too few LEDs", message("reason.too-few-leds")
+    TOO_SMALL = "LEDs too small", message("reason.too-small")
+    NOT_THE_PEN = "spots do not fit the pen", message("reason.not-the-pen")
+    AMBIGUOUS = "ambiguous", message("reason.ambiguous")
+    MISFIT = "LEDs do not fit", message("reason.misfit"), True
+    SLIPPED = "tip slipped", message("reason.slipped"), True
+    TAKEN_OUT = "taken out", message("reason.taken-out"), True  # by the user
+    # of the swing that is used
+    OUTSIDE = "outside the part", message("reason.outside")
+    # as that of another camera
+    OTHER_MOMENT = "not of the same moment", message("reason.other-moment"), True
+    COPY = "same as another image", message("reason.copy"), True
+    # of one camera at a moment that another saw
+    ABSENT = "no image", message("reason.absent")
 
 
 def counted(n_images: int, reason: Reason) -> Message:

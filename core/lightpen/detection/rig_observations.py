@@ -1,7 +1,8 @@
 """Observations by several cameras at the same moments."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -83,25 +84,18 @@ def at_moments(
 
 def _responsive(seen: Observations, images: IntArray) -> Observations:
     absent = images == NONE
-
-    def moved(values: FloatArray) -> FloatArray:
-        taken = values[images]
-        taken[absent] = np.nan
-        return taken
-
+    arrays: dict[str, Any] = {}
+    for each in fields(seen):
+        values = getattr(seen, each.name)
+        if isinstance(values, np.ndarray):
+            arrays[each.name] = values[images]
+            arrays[each.name][absent] = np.nan
     return replace(
         seen,
         names=tuple("" if i == NONE else seen.names[i] for i in images),
-        pixels=moved(seen.pixels),
-        seen_pixels=moved(seen.seen_pixels),
-        areas=moved(seen.areas),
-        sigmas=moved(seen.sigmas),
-        rotations=moved(seen.rotations),
-        translations=moved(seen.translations),
-        edge_widths=moved(seen.edge_widths),
-        lamps=moved(seen.lamps),
         reasons=tuple(Reason.ABSENT if i == NONE else seen.reasons[i] for i in images),
         details=tuple(None if i == NONE else seen.details[i] for i in images),
+        **arrays,
     )
 
 

@@ -17,13 +17,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.causes import diagnose, diagnose_mirror
-from lightpen.detection.labelling.labels import (
-    MODERATE,
-    Labels,
-    LabelStatus,
-    label_images,
-)
+from lightpen.detection.labelling.labels import MODERATE, Labels, label_images
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
+from lightpen.detection.reasons import Reason
 from lightpen.detection.robust_residuals import disc_residuals, robust_sigma
 from lightpen.detection.spots import Spots
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
@@ -240,7 +236,7 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
     found = [
         i
         for i, each in enumerate(labels)
-        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_POSE_LEDS
+        if each.reason is Reason.NONE and each.whole.sum() >= MIN_POSE_LEDS
     ]
     if not found or 2 * len(found) < len(views):
         advice = diagnose(views, camera, pen) if views else None

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.edge_fit import fit_edge
+from lightpen.detection.edge_fit import EdgeStarts, fit_edges
 from lightpen_extensions.boards.boards import Board, BoardKind, marker_dictionary
 from lightpen_extensions.boards.corner_fit import fit_corners
 
@@ -361,18 +361,14 @@ def _rim_centers(
     light = (image.max() - image) if is_dark else image
     apart = _least_distance(rough, board)
     start = (SPOT_SPREAD * board.detail / board.pitch * apart) ** 2 * np.eye(2)
-    centers = np.full_like(rough, np.nan)
-    for i, center in enumerate(rough):
-        rim = fit_edge(light, center, start)
-        if (
-            rim is not None
-            and rim.is_whole
-            and np.linalg.norm(rim.center - center) < OFF_SPOT * apart
-        ):
-            centers[i] = rim.center
-    n_seen = int(np.isfinite(centers[:, 0]).sum())
+    shapes = np.tile(start, (len(rough), 1, 1))
+    rims = fit_edges(light, EdgeStarts.anew(rough, shapes))
+    off = np.linalg.norm(rims.centers - rough, axis=1)
+    good = rims.are_whole & (off < OFF_SPOT * apart)
     # Small or soft circles have no rim to fit: what OpenCV found is kept for all.
-    return centers if n_seen > len(rough) // 2 else rough
+    if good.sum() <= len(rough) // 2:
+        return rough
+    return np.where(good[:, None], rims.centers, np.nan)
 
 
 def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.edge_fit import EdgeFit, fit_edge
+from lightpen.detection.edge_fit import EdgeFits, EdgeStarts, fit_edges
 from lightpen.detection.labelling.constellation import UNWHOLE
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.model.ellipse import Ellipses, disc_images
@@ -62,10 +62,9 @@ def nearest(spots: Spots, center: FloatArray) -> int | None:
     return int(gaps.argmin()) if len(gaps) and gaps.min() < BESIDE else None
 
 
-def rim_of(one: DisplayedImage, led: int) -> EdgeFit:
-    rim = fit_edge(one.image, one.discs.centers[led] + 0.6, 1.1 * one.discs.shapes[led])
-    assert rim is not None
-    return rim
+def rims_of(one: DisplayedImage) -> EdgeFits:
+    starts = EdgeStarts.anew(one.discs.centers + 0.6, 1.1 * one.discs.shapes)
+    return fit_edges(one.image, starts)
 
 
 @pytest.mark.parametrize(
@@ -149,17 +148,16 @@ def test_a_dome_without_light_at_its_rim_is_not_blurred_and_has_its_center() -> 
 
 
 def test_the_rim_tells_the_blur_of_optics_and_pixel() -> None:
-    rim = rim_of(shown("hot-spot")[0], 0)
+    rims = rims_of(shown("hot-spot")[0])
     # Pixel and interpolation widen the Gaussian: 1 / 12 and 1 / 6 px^2.
-    assert rim.sigma == pytest.approx(np.sqrt(0.8**2 + 1 / 12 + 1 / 6), rel=0.06)
+    assert rims.sigmas[0] == pytest.approx(np.sqrt(0.8**2 + 1 / 12 + 1 / 6), rel=0.06)
 
 
 def test_the_rim_of_an_evenly_lit_disc_is_found_as_well() -> None:
     for one in shown("even"):
-        for led, center in enumerate(one.discs.centers):
-            rim = rim_of(one, led)
-            assert rim.is_whole
-            np.testing.assert_allclose(rim.center, center, atol=0.03)
+        rims = rims_of(one)
+        assert rims.are_whole.all()
+        np.testing.assert_allclose(rims.centers, one.discs.centers, atol=0.03)
 
 
 def test_nothing_is_fitted_to_a_smear_or_to_darkness() -> None:
@@ -167,8 +165,8 @@ def test_nothing_is_fitted_to_a_smear_or_to_darkness() -> None:
     smear = np.exp(-((x - 60) ** 2 + (y - 60) ** 2) / 400.0)
     dark = np.zeros((120, 120), np.uint8)
     for image in ((200 * smear).astype(np.uint8), dark):
-        rim = fit_edge(image, np.array([60.0, 60.0]), 60.0 * np.eye(2))
-        assert rim is None or not rim.is_whole
+        start = EdgeStarts.anew(np.full((1, 2), 60.0), 60.0 * np.eye(2)[None])
+        assert not fit_edges(image, start).are_whole.any()
 
 
 @pytest.mark.parametrize("leds", ["even", "hot-spot", "dome"])

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from tests.simulated_plans import live_plan
 
-from lightpen.detection.pen_detection import (
-    Followed,
-    PenDetection,
-    detect_pen,
-    follow_spots,
-)
+from lightpen.detection.pen_detection import PenDetection, detect_pen, follow_spots
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen_extensions.simulator.image_plans import render_plan
 from lightpen_extensions.simulator.scenes import LEDS, Scene
@@ -27,24 +22,21 @@ def detected(time: float) -> PenDetection:
 BEFORE, NOW = detected(1.0), detected(1.05)
 
 
-def followed(spots: Spots | None) -> Followed | None:
+def followed(spots: Spots | None) -> PenDetection | None:
     assert spots is not None
-    assert BEFORE.spots is not None
-    assert BEFORE.labels is not None
-    areas = BEFORE.spots.areas[BEFORE.labels.spot]
-    R, t = BEFORE.rotation, BEFORE.translation
-    return follow_spots(spots, SCENE.camera, SCENE.pen, R, t, areas)
+    return follow_spots(spots, SCENE.camera, SCENE.pen, BEFORE)
 
 
 def test_labels_and_pose_are_those_of_a_search() -> None:
     found = followed(NOW.spots)
     assert found is not None
+    assert found.labels is not None
     assert NOW.labels is not None
     np.testing.assert_array_equal(found.labels.spot, NOW.labels.spot)
     # A thousandth of what noise moves the pose by.
-    np.testing.assert_allclose(found.labels.R, NOW.rotation, atol=1e-6)
-    np.testing.assert_allclose(found.labels.t, NOW.translation, atol=1e-4)
-    np.testing.assert_allclose(found.seen, NOW.seen_pixels, atol=1e-9)
+    np.testing.assert_allclose(found.rotation, NOW.rotation, atol=1e-6)
+    np.testing.assert_allclose(found.translation, NOW.translation, atol=1e-4)
+    np.testing.assert_allclose(found.seen_pixels, NOW.seen_pixels, atol=1e-9)
 
 
 def test_a_foreign_light_beside_an_led_is_not_taken_for_it() -> None:
@@ -54,9 +46,10 @@ def test_a_foreign_light_beside_an_led_is_not_taken_for_it() -> None:
     centers[3] += [2.0, 0.0]
     found = followed(replace(NOW.spots, centers=centers))
     assert found is not None
+    assert found.labels is not None
     wanted = np.where(NOW.labels.spot == 3, -1, NOW.labels.spot)
     np.testing.assert_array_equal(found.labels.spot, wanted)
-    np.testing.assert_allclose(found.labels.R, NOW.rotation, atol=3e-4)
+    np.testing.assert_allclose(found.rotation, NOW.rotation, atol=3e-4)
 
 
 def test_leds_that_changed_their_size_are_left_to_a_search() -> None:
@@ -87,6 +80,7 @@ def test_a_cut_spot_on_its_led_is_labelled_but_not_used() -> None:
     flaws[0] = SpotFlaw.CUT
     found = followed(replace(NOW.spots, flaws=flaws))
     assert found is not None
+    assert found.labels is not None
     led = int(np.flatnonzero(found.labels.spot == 0)[0])
     assert not found.labels.whole[led]
 

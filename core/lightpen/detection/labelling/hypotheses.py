@@ -5,7 +5,7 @@ There are hundreds of triples of LEDs; the size of a spot shows its distance, an
 it the sides of the triangle, so the likeliest can be tried first.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
@@ -300,7 +300,7 @@ def lookalike_poses(
     view = middle_cam / np.linalg.norm(middle_cam, axis=1, keepdims=True)
     R = reflection(view) @ best.R @ reflection(flat)
     t = middle_cam - np.einsum("cij,cj->ci", R, middle)
-    flipped = best.moved(R, t)
+    flipped = replace(best, R=R, t=t)
     n_motions = len(pen.self_rotations)
     one = np.repeat(np.arange(len(best)), n_motions)
     R = (best.R[:, None] @ pen.self_rotations).reshape(-1, 3, 3)

@@ -13,7 +13,6 @@ them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
@@ -42,6 +41,7 @@ from lightpen.detection.labelling.matching import (
     match,
     settle,
 )
+from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -65,16 +65,6 @@ DISPLACED_REACH = 8.0  # px, of an LED from its place in the pen file
 MIN_DISPLACED = 5  # images that show it, and half of all
 
 
-class LabelStatus(StrEnum):
-    """Outcome of labelling an image."""
-
-    LABELLED = "labelled"
-    NO_SPOTS = "no spots"
-    TOO_FEW = "too few spots"
-    NO_FIT = "does not fit the pen"
-    AMBIGUOUS = "ambiguous"
-
-
 @dataclass(frozen=True, eq=False)
 class Labels:
     """The spots of one image that are LEDs, and the pose by them."""
@@ -89,7 +79,7 @@ class Labels:
     t: FloatArray
     # Root mean square of the residuals, per image coordinate, px; nan if refused.
     rms_px: float
-    reason: LabelStatus  # ``LABELLED``, or why the image was refused
+    reason: Reason  # why the image was refused; `Reason.NONE` where it was not
 
 
 EFFORTS = (
@@ -126,7 +116,7 @@ def label_images(
     again = [
         i
         for i, (s, found) in enumerate(zip(spots, labels, strict=True))
-        if found.reason in (LabelStatus.TOO_FEW, LabelStatus.NO_FIT)
+        if found.reason in (Reason.TOO_FEW_LEDS, Reason.NOT_THE_PEN)
         and np.any(s.flaws & UNWHOLE)
         and len(s) >= constellation.min_leds
     ]
@@ -142,7 +132,7 @@ def label_images(
             [spots[i] for i in five], camera, by_five, ALL_ANSWERS
         )
         for i, found in zip(five, found_five, strict=True):
-            if found.reason is LabelStatus.LABELLED:
+            if found.reason is Reason.NONE:
                 labels[i] = found
     return _with_displaced(labels, spots, camera, pen)
 
@@ -159,7 +149,7 @@ def label_spots(spots: Spots, camera: Camera, pen: Pen) -> Labels:
 
 def _is_five(spots: Spots, labels: Labels, pen: Constellation) -> bool:
     """Return whether a refused image shows five whole spots and no others."""
-    refused = labels.reason in (LabelStatus.TOO_FEW, LabelStatus.NO_FIT)
+    refused = labels.reason in (Reason.TOO_FEW_LEDS, Reason.NOT_THE_PEN)
     n_whole = np.count_nonzero(spots.flaws & UNWHOLE == 0)
     return bool(refused and n_whole == FEWEST_LEDS < pen.min_leds)
 
@@ -177,9 +167,9 @@ def _label_whole(
     n_leds = len(pen.leds)
     for i, s in enumerate(spots):
         n_usable = len(s) if use_unwhole else np.sum(s.flaws & UNWHOLE == 0)
-        reason = LabelStatus.TOO_FEW if len(s) else LabelStatus.NO_SPOTS
+        reason = Reason.TOO_FEW_LEDS if len(s) else Reason.EMPTY
         if n_usable >= pen.min_leds:
-            reason = LabelStatus.NO_FIT
+            reason = Reason.NOT_THE_PEN
             pending.append(i)
         labels.append(_refused(n_leds, reason))
     if not pending:
@@ -196,7 +186,7 @@ def _label_whole(
             found = _search(sight, pen, effort, some)
             for i, label in zip(images, found, strict=True):
                 labels[i] = label
-                if label.reason is LabelStatus.NO_FIT:
+                if label.reason is Reason.NOT_THE_PEN:
                     left.append(i)
         pending = left
     return labels
@@ -206,7 +196,7 @@ def _with_displaced(
     labels: list[Labels], spots: Sequence[Spots], camera: Camera, pen: Pen
 ) -> list[Labels]:
     """Give LEDs that lie off their place in most images the spots they have there."""
-    labelled = [i for i, one in enumerate(labels) if one.reason is LabelStatus.LABELLED]
+    labelled = [i for i, one in enumerate(labels) if one.reason is Reason.NONE]
     beside = np.full((len(labels), pen.n_leds), -1)
     for i in labelled:
         bare = np.flatnonzero(labels[i].spot < 0)
@@ -274,7 +264,7 @@ def _judge(
     spots: Sequence[Spots],
 ) -> list[Labels]:
     """Return the labels of each image: its best candidate, if none comes near it."""
-    labels = [_refused(len(pen.leds), LabelStatus.NO_FIT) for _ in spots]
+    labels = [_refused(len(pen.leds), Reason.NOT_THE_PEN) for _ in spots]
     if not len(best):
         return labels
     of_image = np.full(len(spots), -1)
@@ -290,7 +280,7 @@ def _judge(
     unwhole = _on_unwhole(sight, pen, winners)
     for i, image in enumerate(winners.image):
         if ambiguous[image]:
-            labels[image] = _refused(len(pen.leds), LabelStatus.AMBIGUOUS)
+            labels[image] = _refused(len(pen.leds), Reason.AMBIGUOUS)
             continue
         spot = np.where(winners.spot[i] >= 0, winners.spot[i], unwhole[i])
         flaws = spots[image].flaws[spot]
@@ -300,7 +290,7 @@ def _judge(
             R=winners.R[i],
             t=winners.t[i],
             rms_px=float(winners.rms[i]),
-            reason=LabelStatus.LABELLED,
+            reason=Reason.NONE,
         )
     return labels
 
@@ -337,7 +327,7 @@ def _differ(some: Candidates, others: Candidates) -> BoolArray:
     return np.asarray(renamed | few | turned)
 
 
-def _refused(n_leds: int, reason: LabelStatus) -> Labels:
+def _refused(n_leds: int, reason: Reason) -> Labels:
     return Labels(
         spot=np.full(n_leds, -1),
         whole=np.zeros(n_leds, dtype=bool),

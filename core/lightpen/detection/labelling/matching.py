@@ -65,17 +65,7 @@ class Candidates:
 
     def of(self, which: IntArray | BoolArray) -> "Candidates":
         """Return some of the candidates."""
-        R, t, ratio = self.R[which], self.t[which], self.area_ratio[which]
-        spot, residuals = self.spot[which], self.residuals[which]
-        return Candidates(self.image[which], R, t, spot, residuals, ratio)
-
-    def moved(self, R: FloatArray, t: FloatArray) -> "Candidates":
-        """Return the candidates at other poses."""
-        return Candidates(self.image, R, t, self.spot, self.residuals, self.area_ratio)
-
-    def paired(self, spot: IntArray, residuals: FloatArray) -> "Candidates":
-        """Return the candidates with other spots."""
-        return Candidates(self.image, self.R, self.t, spot, residuals, self.area_ratio)
+        return Candidates(*(getattr(self, f.name)[which] for f in fields(self)))
 
 
 def join(parts: Sequence[Candidates]) -> Candidates:
@@ -158,7 +148,7 @@ def fit(
     leds = pen.leds @ candidates.R.transpose(0, 2, 1) + candidates.t[:, None]
     offsets = _offsets(sight, candidates, leds, eccentric)
     lengths = np.hypot(offsets[..., 0], offsets[..., 1])
-    return candidates.paired(candidates.spot, lengths)
+    return replace(candidates, residuals=lengths)
 
 
 def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
@@ -253,7 +243,7 @@ def _step(
     turn = np.sqrt(np.einsum("ci,ci->c", step[:, :3], step[:, :3]))
     step *= (MAX_TURN / np.maximum(turn, MAX_TURN))[:, None]
     R = rotation_from_vector(step[:, :3]) @ candidates.R
-    return candidates.moved(R, candidates.t + step[:, 3:])
+    return replace(candidates, R=R, t=candidates.t + step[:, 3:])
 
 
 def _drop_misshapen(
@@ -316,7 +306,7 @@ def _drop_worst(
     without = candidates.of(row)
     spot = without.spot.copy()
     spot[np.arange(len(row)), led] = -1
-    without = fit(sight, pen, without.paired(spot, without.residuals), n_steps=2)
+    without = fit(sight, pen, replace(without, spot=spot), n_steps=2)
     floor = 2 * n[row] * FLOOR_RMS**2
     ratio = (without.sum_squares + floor) / (candidates.sum_squares[row] + floor)
     chance = ratio ** (n[row] - 4)
@@ -330,7 +320,8 @@ def _drop_worst(
 
 def _drop(candidates: Candidates, bad: BoolArray) -> Candidates:
     spot = np.where(bad, -1, candidates.spot)
-    return candidates.paired(spot, np.where(bad, 0.0, candidates.residuals))
+    residuals = np.where(bad, 0.0, candidates.residuals)
+    return replace(candidates, spot=spot, residuals=residuals)
 
 
 def _median(values: FloatArray, known: BoolArray) -> FloatArray:

@@ -13,13 +13,9 @@ from benchmarks.labelling import spots_at
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.causes import diagnose
-from lightpen.detection.labelling.labels import (
-    Labels,
-    LabelStatus,
-    label_images,
-    label_spots,
-)
-from lightpen.detection.pen_detection import follow_spots
+from lightpen.detection.labelling.labels import Labels, label_images, label_spots
+from lightpen.detection.pen_detection import PenDetection, follow_spots
+from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
@@ -154,7 +150,7 @@ def random_lamps(rng: np.random.Generator, n: int) -> Spots:
 
 
 def outcome(labels: Labels, view: View) -> str:
-    if labels.reason is not LabelStatus.LABELLED:
+    if labels.reason is not Reason.NONE:
         return str(labels.reason)
     labelled = labels.spot >= 0
     right = np.array_equal(labels.spot[labelled], view.spot[labelled])
@@ -210,7 +206,7 @@ def test_all_leds_of_clean_images_are_labelled() -> None:
     views = [random_view(rng) for _ in range(100)]
     labels = label_images([view.spots for view in views], CAMERA, PEN)
     for label, view in zip(labels, views, strict=True):
-        assert label.reason is LabelStatus.LABELLED
+        assert label.reason is Reason.NONE
         np.testing.assert_array_equal(label.spot, view.spot)
         assert label.whole.all()
 
@@ -264,7 +260,7 @@ def test_hidden_leds_are_reported_missing(n_missing: int) -> None:
     found = [
         (label, view)
         for label, view in zip(labels, views, strict=True)
-        if label.reason is LabelStatus.LABELLED
+        if label.reason is Reason.NONE
     ]
     assert len(found) >= 58
     for label, view in found:
@@ -305,7 +301,7 @@ def test_a_lamp_beside_the_place_of_a_hidden_led_is_not_labelled() -> None:
     for _ in range(20):
         view = with_lamp(random_view(rng, n_missing=3), (1.5, -1.0))
         label = label_spots(view.spots, CAMERA, PEN)
-        assert label.reason is LabelStatus.LABELLED
+        assert label.reason is Reason.NONE
         np.testing.assert_array_equal(label.spot, view.spot)
 
 
@@ -314,14 +310,14 @@ def test_a_lamp_beside_the_place_of_a_hidden_led_is_not_labelled() -> None:
 
 def test_an_image_without_spots_is_refused() -> None:
     label = label_spots(spots_at(np.empty((0, 2)), np.empty((0, 2, 2))), CAMERA, PEN)
-    assert label.reason is LabelStatus.NO_SPOTS
+    assert label.reason is Reason.EMPTY
     assert (label.spot == -1).all()
     assert np.isnan(label.R).all()
 
 
 def test_fewer_than_five_leds_are_refused() -> None:
     view = random_view(np.random.default_rng(40), n_missing=6)
-    assert label_spots(view.spots, CAMERA, PEN).reason is LabelStatus.TOO_FEW
+    assert label_spots(view.spots, CAMERA, PEN).reason is Reason.TOO_FEW_LEDS
 
 
 @pytest.mark.slow
@@ -330,13 +326,13 @@ def test_five_leds_alone_are_labelled_if_they_fit_one_way_only(name: str) -> Non
     pen = SAMPLE_PENS[name]()
     n_missing = pen.n_leds - 5
     found = outcomes(lambda rng: random_view(rng, pen, n_missing), pen, 30, seed=46)
-    assert set(found) <= {"right", str(LabelStatus.TOO_FEW), str(LabelStatus.NO_FIT)}
+    assert set(found) <= {"right", str(Reason.TOO_FEW_LEDS), str(Reason.NOT_THE_PEN)}
     assert found["right"] >= 15
 
 
 def test_four_leds_and_a_lamp_are_not_taken_for_five() -> None:
     found = outcomes(lambda rng: random_view(rng, PEN, 6, 1), PEN, 30, seed=47)
-    assert found == {str(LabelStatus.TOO_FEW): 30}
+    assert found == {str(Reason.TOO_FEW_LEDS): 30}
 
 
 @pytest.mark.slow
@@ -347,8 +343,8 @@ def test_lamps_without_a_pen_are_refused(n_lamps: int) -> None:
     for pen in (PEN, FOUR_LED_PEN, FIVE_LED_PEN, PLANAR_SIX_LED_PEN):
         labels = label_images(spots, CAMERA, pen)
         assert {label.reason for label in labels} <= {
-            LabelStatus.NO_FIT,
-            LabelStatus.AMBIGUOUS,
+            Reason.NOT_THE_PEN,
+            Reason.AMBIGUOUS,
         }
 
 
@@ -358,7 +354,7 @@ def test_too_many_hidden_leds_are_not_made_up_for_by_lamps() -> None:
         return random_view(rng, PEN, int(rng.integers(5, 7)), int(rng.integers(2, 6)))
 
     found = outcomes(make, PEN, 30, seed=42)
-    assert set(found) <= {str(LabelStatus.NO_FIT), str(LabelStatus.TOO_FEW)}
+    assert set(found) <= {str(Reason.NOT_THE_PEN), str(Reason.TOO_FEW_LEDS)}
 
 
 def test_a_lamp_near_the_place_of_a_hidden_led_does_not_make_up_for_it() -> None:
@@ -367,7 +363,7 @@ def test_a_lamp_near_the_place_of_a_hidden_led_does_not_make_up_for_it() -> None
     def make(rng: np.random.Generator) -> View:
         return with_lamp(random_view(rng, PEN, 5, 3), (0.8, -0.6))
 
-    assert outcomes(make, PEN, 8, seed=44) == {str(LabelStatus.NO_FIT): 8}
+    assert outcomes(make, PEN, 8, seed=44) == {str(Reason.NOT_THE_PEN): 8}
 
 
 def test_five_leds_of_which_one_is_off_are_hardly_ever_believed() -> None:
@@ -376,19 +372,19 @@ def test_five_leds_of_which_one_is_off_are_hardly_ever_believed() -> None:
     spots = [flawed(view.spots, 0, SpotFlaw.NONE, shift=2.0) for view in views]
     labels = label_images(spots, CAMERA, FIVE_LED_PEN)
     # The pose of five follows the shift of one to 0.3 px at times.
-    assert sum(label.reason is LabelStatus.NO_FIT for label in labels) >= 14
+    assert sum(label.reason is Reason.NOT_THE_PEN for label in labels) >= 14
 
 
 def test_four_leds_that_chance_would_find_among_lamps_are_refused() -> None:
     found = outcomes(
         lambda rng: random_view(rng, FOUR_LED_PEN, 0, 16), FOUR_LED_PEN, 4, seed=45
     )
-    assert found == {str(LabelStatus.NO_FIT): 4}
+    assert found == {str(Reason.NOT_THE_PEN): 4}
 
 
 def test_the_spots_of_another_pen_are_refused() -> None:
     views = outcomes(lambda rng: random_view(rng, TWELVE_LED_PEN), PEN, 15, seed=43)
-    assert set(views) == {str(LabelStatus.NO_FIT)}
+    assert set(views) == {str(Reason.NOT_THE_PEN)}
 
 
 def test_a_pen_of_fewer_than_four_leds_is_a_bug_of_the_caller() -> None:
@@ -446,7 +442,7 @@ def test_four_led_pens_are_right_or_refused_among_lamps() -> None:
 )
 def test_symmetric_pens_are_refused_as_ambiguous(pen: Pen) -> None:
     found = outcomes(lambda rng: random_view(rng, pen), pen, 30, seed=53)
-    assert found == {str(LabelStatus.AMBIGUOUS): 30}
+    assert found == {str(Reason.AMBIGUOUS): 30}
 
 
 @pytest.mark.parametrize("asymmetry", [0.01, 0.03, 0.1, 0.5, 2.0])
@@ -533,8 +529,9 @@ def beside(
 
 
 def followed(view: View, guess: View) -> Labels | None:
-    unseen = np.full(PEN.n_leds, np.nan)
-    found = follow_spots(view.spots, CAMERA, PEN, guess.R, guess.t, unseen)
+    unseen = np.full((PEN.n_leds, 2), np.nan)
+    before = PenDetection(unseen, unseen, Reason.NONE, guess.R, guess.t)
+    found = follow_spots(view.spots, CAMERA, PEN, before)
     return None if found is None else found.labels
 
 
