@@ -1,8 +1,7 @@
-"""A figure that can be saved as PNG and CSV."""
+"""A figure that can be saved as PNG."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import TypeAlias
 
 from PySide6.QtCore import (
@@ -20,7 +19,6 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.tables import csv_table
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.fields import anew
 
@@ -87,14 +85,8 @@ class Figure(QWidget):
         image.save(buffer, "PNG")  # type: ignore[call-overload]
         return bytes(data.data())
 
-    def csv(self) -> bytes:
-        """Return the numbers behind the plot, one column each."""
-        rows = zip_longest(*self._columns.values(), fillvalue="")
-        cells = (map(_cell, row) for row in rows)
-        return csv_table([self._columns, *cells]).encode()
-
     def columns(self) -> Mapping[str, Column]:
-        """Return the displayed data by CSV column."""
+        """Return the displayed data by name."""
         return self._columns
 
     @override
@@ -108,11 +100,3 @@ class Figure(QWidget):
     def _restyle(self) -> None:
         """Update words and colours."""
         raise NotImplementedError
-
-
-def _cell(value: float | str) -> float | str:
-    """Return an entry of a CSV file; numbers with nine digits."""
-    if isinstance(value, str):
-        return value
-    rounded = float(f"{value:.9g}")
-    return int(rounded) if rounded.is_integer() else rounded

@@ -3302,28 +3302,8 @@
 <context>
     <name>PlotCard</name>
     <message>
-        <source>Saved as {0}</source>
-        <translation>已保存为 {0}</translation>
-    </message>
-    <message>
-        <source>Save plot</source>
-        <translation>保存图表</translation>
-    </message>
-    <message>
-        <source>Enlarge</source>
-        <translation>放大</translation>
-    </message>
-    <message>
-        <source>Save picture (PNG)</source>
-        <translation>保存图片 (PNG)</translation>
-    </message>
-    <message>
-        <source>Save numbers (CSV)</source>
-        <translation>保存数据 (CSV)</translation>
-    </message>
-    <message>
-        <source>Enlarge or save this plot</source>
-        <translation>放大或保存此图表</translation>
+        <source>Enlarge this plot</source>
+        <translation>放大此图</translation>
     </message>
 </context>
 <context>

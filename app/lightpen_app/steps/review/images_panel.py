@@ -63,9 +63,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
     # list of int: numbers of images
     exclude_requested = Signal(list)
     include_requested = Signal(list)
-    # Message on a saved plot, or on a failure to save it.
-    saved = Signal(str)
-    failed = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -110,8 +107,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._misfits.number_chosen.connect(self._table.choose)
         self._misfits.limit_set.connect(self._exclude_images)
         self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
-        self._card.saved.connect(self.saved)
-        self._card.failed.connect(self.failed)
         self._shortcut(QKeySequence.StandardKey.Delete, self._exclude.click)
         self._shortcut(Qt.Key.Key_Insert, self._include.click)
 

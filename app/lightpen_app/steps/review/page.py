@@ -83,8 +83,6 @@ class ReviewPage(Page):
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.methods_made.connect(self._on_methods_made)
-        view.tabs.saved.connect(notices.show_status)
-        view.tabs.failed.connect(partial(notices.notify, self.key))
         self._along.follow(view.tools)
         self._along.message_sent.connect(notices.show_status)
         self._along.failed.connect(partial(notices.notify, self.key))

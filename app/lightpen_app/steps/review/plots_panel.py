@@ -44,10 +44,6 @@ SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a 
 class PlotsPanel(Translated, QWidget):
     """Base of the panels: shows plots of a solution."""
 
-    # Message on a saved plot, or on a failure to save it.
-    saved = Signal(str)
-    failed = Signal(str)
-
     def __init__(self, cards: Sequence[PlotCard]) -> None:
         super().__init__()
         self._solution: Solution | None = None
@@ -58,10 +54,6 @@ class PlotsPanel(Translated, QWidget):
 
         # Layout
         self._layout = vertical_layout(self, (self._grid, 1), margins=(0, GRID, 0, 0))
-
-        # Connections
-        self._grid.saved.connect(self.saved)
-        self._grid.failed.connect(self.failed)
 
     def value(self) -> Solution | None:
         """Return the solution that is shown."""

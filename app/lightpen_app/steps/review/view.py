@@ -53,9 +53,6 @@ class DetailTabs(QTabWidget):
     images_made = Signal(object)
     # MethodsPanel: the tab of the methods is seen for the first time
     methods_made = Signal(object)
-    # Message on a saved plot, or on a failure to save it.
-    saved = Signal(str)
-    failed = Signal(str)
 
     def __init__(self, run: SwingRun, place: SavePlace) -> None:
         super().__init__()
@@ -78,8 +75,6 @@ class DetailTabs(QTabWidget):
         # Connections
         self._images.made.connect(self.images_made)
         self._methods.made.connect(self.methods_made)
-        for panel in self._panels:
-            panel.made.connect(self._on_panel_made)
         self.currentChanged.connect(self.fill)
 
     def set_names(self, images: str, residuals: str, u: str, methods: str) -> None:
@@ -111,7 +106,8 @@ class DetailTabs(QTabWidget):
             tab.resize(self.currentWidget().size())
             tab.grab()  # lays it out as if it was looked at
         cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
-        return [card.picture() for card in cards if card.is_needed]
+        mark = self._place.mark()
+        return [card.picture(mark) for card in cards if card.is_needed]
 
     def shut_down(self) -> None:
         """Cancel running jobs."""
@@ -128,12 +124,6 @@ class DetailTabs(QTabWidget):
             panel.set_value(solution, limit)
         if failure is not None and setup is not None and residuals is not None:
             residuals.set_failed(failure, setup.rig)
-
-    def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
-        for card in panel.cards():
-            card.set_place(self._place)
-        panel.saved.connect(self.saved)
-        panel.failed.connect(self.failed)
 
 
 # Imported here: plots take a fifth of the start time, and the first window has none.

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 from tests.simulated_centers import observe_pixels
 
@@ -53,6 +54,6 @@ def test_the_lens_field_is_mapped_where_the_images_support_one(qtbot: QtBot) -> 
     assert plot.accessibleName().startswith("Lens field")
     assert len(plot.lines()[0]) > 6
     for is_enlarged in (True, False):
-        card.actions_offered()[0].toggle()
+        card.findChildren(QToolButton)[0].click()
         assert first.isVisible() is not is_enlarged
         assert card.isVisible()
