@@ -11,9 +11,9 @@
    residuals of all images.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -50,12 +50,14 @@ from lightpen.estimation.contact.joint import (
     joint_at,
 )
 from lightpen.estimation.contact.single_images import (
-    CameraPath,
+    CameraImages,
     PosedImages,
     SteadyImages,
     pose_steadily,
+    reasons_of_moments,
     require_fit,
     require_images,
+    rms_of_moments,
     without_field,
 )
 from lightpen.estimation.pivot.pivot import TwoStageFit, fit_two_stage, projection_bias
@@ -85,25 +87,6 @@ NOT_SETTLED = ("joint.not-settled", "bundle.not-settled")
 
 
 @dataclass(frozen=True, eq=False)
-class CameraImages:
-    """The images of one camera in a calibration, one at each of N moments."""
-
-    observations: Observations
-    # Why an image was left out; `Reason.NONE` for the used ones.
-    reasons: tuple[Reason, ...]
-    # (N,), root mean square residual of each image, px; NaN without a pose.
-    rms: FloatArray
-    leds_used: BoolArray  # (N, L)
-    total_rms: float  # root mean square residual of all LEDs used, px
-    path: CameraPath | None  # motion of the camera by its fixed lamps; None without any
-
-    @property
-    def used(self) -> BoolArray:
-        """Mask of the used images, (N,)."""
-        return np.array([reason is Reason.NONE for reason in self.reasons])
-
-
-@dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibrated tip.
 
@@ -127,7 +110,6 @@ class Calibration:
     stated: Priors  # priors from the files, with defaults where these state none
     priors: Priors  # the same with contradicted numbers released
     assumptions: Assumptions  # default uncertainties where the files state none
-    growth: float  # thermal expansion of the pen against its file, relative
     # Whether files were found from these images, which then count once.
     shares_images: bool
     contradictions: tuple[Contradiction, ...]
@@ -148,11 +130,6 @@ class Calibration:
     def observations(self) -> Observations:
         """Observations of the first camera."""
         return self.cameras[0].observations
-
-    @property
-    def leds_used(self) -> BoolArray:
-        """Mask of the used LEDs of the first camera, (N, L)."""
-        return self.cameras[0].leds_used
 
     @property
     def moved(self) -> float:
@@ -329,24 +306,20 @@ def _fit_single_cameras(
 ) -> _SingleCameraFits:
     """Fit the poses of each camera's images; a tip slips before all cameras."""
     rig = inputs.rig
-    steady = tuple(
-        _of_camera(
-            rig,
-            c,
-            partial(
-                pose_steadily,
-                camera,
-                inputs.pen,
-                without_field(camera, without_copies(seen)),
-            ),
-        )
-        for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
-    )
+    steady = []
+    for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True)):
+        own = without_field(camera, without_copies(seen))
+        try:
+            steady.append(pose_steadily(camera, inputs.pen, own))
+        except CalibrationError as error:
+            if rig.n_cameras == 1:
+                raise
+            raise CalibrationError(of_camera(rig.names[c], error.message)) from error
     reasons = np.stack([each.posed.reasons for each in steady], axis=1)
     slipped = np.any(reasons == Reason.SLIPPED, axis=1, keepdims=True)
     reasons[slipped & (reasons == Reason.NONE)] = Reason.SLIPPED
     pixels = np.stack([each.observations.pixels for each in steady], axis=1)
-    return _SingleCameraFits(tuple(observations), steady, pixels, reasons)
+    return _SingleCameraFits(tuple(observations), tuple(steady), pixels, reasons)
 
 
 def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
@@ -435,7 +408,7 @@ def _calibration_of(
         _camera_images(single, start, c, refined[c], joint.of_camera(c, pen.n_leds))
         for c in range(len(refined))
     )
-    reasons = _reasons_of_moments(cameras)
+    reasons = reasons_of_moments(cameras)
     budget = combine(adjustment, joint)
     paper_poses = _paper_poses(inputs.rig.cameras[0], pen, single, start)
     two_stage = fit_two_stage(paper_poses.rotations, paper_poses.translations)
@@ -444,13 +417,12 @@ def _calibration_of(
         reasons=reasons,
         used=np.array([reason is Reason.NONE for reason in reasons]),
         tips_cam=poses.rotations @ joint.tip_pen + poses.translations,
-        rms=_rms_of_moments(cameras),
+        rms=rms_of_moments(cameras),
         joint=joint,
         bundle=adjustment.bundle,
         stated=adjusted.stated,
         priors=adjustment.priors,
         assumptions=inputs.assumptions,
-        growth=adjustment.priors.growth,
         shares_images=inputs.shares_images,
         contradictions=adjustment.contradictions,
         two_stage=two_stage,
@@ -524,35 +496,3 @@ def _camera_images(
         total_rms=own.rms if own.used.any() else float("nan"),
         path=single.steady[c].path,
     )
-
-
-def _of_camera(rig: Rig, c: int, work: Callable[[], SteadyImages]) -> SteadyImages:
-    """Return the result of the work on one camera's images; errors name the camera."""
-    try:
-        return work()
-    except CalibrationError as error:
-        if rig.n_cameras == 1:
-            raise
-        raise CalibrationError(of_camera(rig.names[c], error.message)) from error
-
-
-def _reasons_of_moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
-    """Return why each moment is excluded; NONE if one of its images is used."""
-    reasons = []
-    for of_cameras in zip(*(each.reasons for each in cameras), strict=True):
-        present = [reason for reason in of_cameras if reason is not Reason.ABSENT]
-        reasons.append(Reason.NONE if Reason.NONE in present else present[0])
-    return tuple(reasons)
-
-
-def _rms_of_moments(cameras: Sequence[CameraImages]) -> FloatArray:
-    """Return the rms residual of the images of each moment, px, (N,)."""
-    rms = np.stack([each.rms for each in cameras], axis=1)
-    known = np.isfinite(rms)
-    seen = np.stack([each.observations.pixels[..., 0] for each in cameras], axis=1)
-    counts = np.where(known, np.isfinite(seen).sum(axis=2), 0)
-    clean = np.where(known, rms, 0.0)
-    mean = np.sum(counts * clean**2, axis=1) / np.maximum(counts.sum(axis=1), 1)
-    alone = known.sum(axis=1) == 1
-    together = np.where(alone, clean.sum(axis=1), np.sqrt(mean))
-    return np.where(known.any(axis=1), together, np.nan)

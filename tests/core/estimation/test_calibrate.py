@@ -123,8 +123,8 @@ def test_an_led_left_out_in_one_image_is_reported() -> None:
     pixels[7, 3] += 2.0
     result = calibration(pixels)
 
-    assert not result.leds_used[7, 3]
-    assert result.leds_used.sum() == 60 * 10 - 1
+    assert not result.cameras[0].leds_used[7, 3]
+    assert result.cameras[0].leds_used.sum() == 60 * 10 - 1
 
 
 def test_seated_operator_swings_calibrate() -> None:

@@ -1,5 +1,6 @@
 """Single images of one camera: their poses, and which agree on a tip."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -324,3 +325,47 @@ def _share_of_pen(camera: Camera, path: CameraPath, posed: PosedImages) -> float
     )
     together = np.sum(by_lamps * by_pen)
     return float(together / max(np.sum(by_lamps**2), LEAST**2))
+
+
+# The images of one camera after the calibration, and of all at one moment.
+
+
+@dataclass(frozen=True, eq=False)
+class CameraImages:
+    """The images of one camera in a calibration, one at each of N moments."""
+
+    observations: Observations
+    # Why an image was left out; `Reason.NONE` for the used ones.
+    reasons: tuple[Reason, ...]
+    # (N,), root mean square residual of each image, px; NaN without a pose.
+    rms: FloatArray
+    leds_used: BoolArray  # (N, L)
+    total_rms: float  # root mean square residual of all LEDs used, px
+    path: CameraPath | None  # motion of the camera by its fixed lamps; None without any
+
+    @property
+    def used(self) -> BoolArray:
+        """Mask of the used images, (N,)."""
+        return np.array([reason is Reason.NONE for reason in self.reasons])
+
+
+def reasons_of_moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
+    """Return why each moment is excluded; NONE if one of its images is used."""
+    reasons = []
+    for of_cameras in zip(*(each.reasons for each in cameras), strict=True):
+        present = [reason for reason in of_cameras if reason is not Reason.ABSENT]
+        reasons.append(Reason.NONE if Reason.NONE in present else present[0])
+    return tuple(reasons)
+
+
+def rms_of_moments(cameras: Sequence[CameraImages]) -> FloatArray:
+    """Return the rms residual of the images of each moment, px, (N,)."""
+    rms = np.stack([each.rms for each in cameras], axis=1)
+    known = np.isfinite(rms)
+    seen = np.stack([each.observations.pixels[..., 0] for each in cameras], axis=1)
+    counts = np.where(known, np.isfinite(seen).sum(axis=2), 0)
+    clean = np.where(known, rms, 0.0)
+    mean = np.sum(counts * clean**2, axis=1) / np.maximum(counts.sum(axis=1), 1)
+    alone = known.sum(axis=1) == 1
+    together = np.where(alone, clean.sum(axis=1), np.sqrt(mean))
+    return np.where(known.any(axis=1), together, np.nan)

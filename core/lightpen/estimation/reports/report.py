@@ -7,7 +7,8 @@ from msgspec import structs
 
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
-from lightpen.estimation.calibrate import Calibration, CameraImages
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.contact.single_images import CameraImages
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
     AdjustmentRecord,
@@ -191,7 +192,7 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
     return AdjustmentRecord(
         intrinsics=_adjusted_intrinsics(calibration, 0),
         intrinsics_uncertainty_assumed=priors.cameras[0].assumed,
-        pen_growth=plain(calibration.growth),
+        pen_growth=plain(calibration.priors.growth),
         disc_diameter_mm=plain(calibration.bundle.state.pen.diameter),
         disc_diameter_by_areas_mm=(
             None

@@ -6,7 +6,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.calibrate import Calibration, CameraImages
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.contact.single_images import CameraImages
 from lightpen.estimation.pivot.pivot import TwoStageFit
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.reports.report_warnings import (
@@ -189,10 +190,11 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
 
 def _pen_lines(calibration: Calibration) -> list[str]:
     lines = []
-    if calibration.growth != 0:
+    growth = calibration.priors.growth
+    if growth != 0:
         lines.append(
-            f"Temperature  the pen is {1e6 * calibration.growth:+.1f} ppm larger than "
-            "its file says, which is corrected"
+            f"Temperature  the pen is {1e6 * growth:+.1f} ppm larger than its file "
+            "says, which is corrected"
         )
     reading = calibration.priors.reading
     if reading is not None:

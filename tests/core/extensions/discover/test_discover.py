@@ -69,7 +69,7 @@ def test_every_image_and_every_led_takes_part(found: Discovery) -> None:
     assert found.calibration.used.all()
     assert found.pen.n_leds == SHORT.pen.n_leds
     n_seen = int(np.isfinite(SHORT.pixels[..., 0]).sum())
-    assert found.calibration.leds_used.sum() > 0.99 * n_seen
+    assert found.calibration.cameras[0].leds_used.sum() > 0.99 * n_seen
 
 
 def test_the_mirror_image_fits_far_worse(found: Discovery) -> None:
