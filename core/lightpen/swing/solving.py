@@ -26,8 +26,13 @@ from lightpen.record.swings.writing import note_excluded
 from lightpen.runners import BackgroundTask, Report, StartThread
 from lightpen.swing.capture.rules import conclude
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.operator_presence import PublishedSwing
-from lightpen.swing.status import Activity, SwingListener, SwingStatus, failed_swing
+from lightpen.swing.status import (
+    Activity,
+    PublishedSwing,
+    SwingListener,
+    SwingStatus,
+    failed_swing,
+)
 
 T = TypeVar("T")
 

@@ -44,10 +44,9 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
 )
-from lightpen.swing.operator_presence import PublishedSwing
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.solving import SwingSolving
-from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.status import Activity, PublishedSwing, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import (
     Resumable,
     SwingRecorder,

@@ -6,8 +6,8 @@ import pytest
 
 from lightpen.messages import message
 from lightpen.record.swings.header import Names
-from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.status import OperatorPresence
 
 WHY = message("system.full")
 

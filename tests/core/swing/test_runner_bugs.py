@@ -10,8 +10,7 @@ import pytest
 
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.operator_presence import OperatorPresence
-from lightpen.swing.status import Activity
+from lightpen.swing.status import Activity, OperatorPresence
 from lightpen.swing.swing_recorder import read_resumable
 
 if TYPE_CHECKING:

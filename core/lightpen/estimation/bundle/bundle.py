@@ -26,7 +26,6 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.image_fields import (
     FieldName,
     ImageField,
@@ -50,6 +49,7 @@ from lightpen.estimation.bundle.unknowns import (
     Components,
     ParameterLayout,
     Unknowns,
+    find_components,
 )
 from lightpen.estimation.contact.joint import inliers
 from lightpen.estimation.variance_components import RandomEffect, find_jitter

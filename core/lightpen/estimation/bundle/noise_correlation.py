@@ -20,9 +20,8 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.estimation.bundle.bundle import Bundle
-from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.linearised import N_CONE, N_TURN, CameraView, eliminate
-from lightpen.estimation.bundle.unknowns import Components, Unknowns
+from lightpen.estimation.bundle.unknowns import Components, Unknowns, find_components
 from lightpen.model.coverage import inverse, normal_quantile
 
 

@@ -5,6 +5,7 @@ seat modes and drift shift the cone of each image by its weights, equation (4) o
 method.md.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from lightpen.estimation.bundle.image_fields import (
     ImageField,
     SeatModes,
     held,
+    size_of,
 )
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
@@ -27,7 +29,13 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.variance_components import Component, RandomEffect
+from lightpen.estimation.variance_components import (
+    FITTED,
+    Component,
+    RandomEffect,
+    find_beside,
+    find_component,
+)
 from lightpen.model.coverage import EXACT, inverse, known_by
 from lightpen.model.pen import effective_tip
 from lightpen.model.rigid import rotation_from_vector, skew
@@ -348,3 +356,88 @@ def whole_moves(leds: FloatArray) -> FloatArray:
     shifts = np.tile(np.eye(3), (len(leds), 1))
     turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
     return np.concatenate([shifts, turns], axis=1)
+
+
+# Joint estimation of all variance components.
+
+
+ROUNDS = 3  # of finding each component beside the others
+
+
+def find_components(
+    unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
+) -> Components:
+    """Estimate the components jointly, given those of the previous pass.
+
+    ``information`` (p, p) and ``right`` (p,) are of images and measurements.
+    """
+    now = before
+    for _ in range(ROUNDS):
+        known, now = now, _found_once(unknowns, information, right, now)
+        if now.sigmas == known.sigmas:  # converged
+            break
+    return now
+
+
+def _found_once(
+    unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
+) -> Components:
+    at, prior = unknowns.layout, unknowns.prior_information(before)
+    covariance = inverse(information + prior)
+    by_priors = unknowns.prior_right()
+    values = covariance @ (right + by_priors)
+
+    def own(place: slice) -> tuple[FloatArray, FloatArray]:
+        known = inverse(covariance[place, place])
+        return known - prior[place, place], known @ values[place] - by_priors[place]
+
+    def find(place: slice, stated: float = 0.0) -> Component:
+        return find_component(*own(place), stated)
+
+    return before._replace(
+        leds=_found_leds(unknowns, find),
+        seat=_found_seat(unknowns, *own(at.whole_seat), before),
+        drift=_likely(find(at.drift)),
+        fields=tuple(
+            size_of(field, *own(place))
+            for field, place in zip(unknowns.fields, at.fields, strict=True)
+        ),
+    )
+
+
+def _found_seat(
+    unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
+) -> tuple[Component, ...]:
+    """Return the component of each kind of seat mode beside those of the others.
+
+    ``information`` (21, 21) and ``right`` (21,) are of all modes, without any prior.
+    """
+    variances, form_error = unknowns.seat_variances(before), unknowns.priors.form_error
+    first, seat = unknowns.layout.whole_seat.start, []
+    for place in unknowns.layout.seat:
+        some = slice(place.start - first, place.stop - first)
+        others = variances.copy()
+        others[some] = 0.0
+        moves = np.eye(len(variances))[:, some]
+        found = find_beside(information, right, moves, np.diag(others), form_error)
+        seat.append(_likely(found, form_error))
+    return tuple(seat)
+
+
+def _found_leds(
+    unknowns: Unknowns, find: Callable[[slice, float], Component]
+) -> Component:
+    stated, of_leds = unknowns.priors.led_sigma, unknowns.priors.led_covariance
+    if of_leds is not None:  # by the least known direction
+        stated = float(np.sqrt(np.linalg.eigvalsh(of_leds)[-1]))
+    component = find(unknowns.layout.leds, stated or 0.0)
+    if stated is None or (component.is_significant and component.sigma > stated):
+        return component
+    return NONE
+
+
+def _likely(found: Component, stated: float = 0.0) -> Component:
+    """Return a component if it is significant; else one of standard deviation 0."""
+    if found.sigma > stated and found.exceeds(FITTED):
+        return found
+    return NONE._replace(expected_sigma=found.expected_sigma)
