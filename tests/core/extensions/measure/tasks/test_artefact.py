@@ -15,11 +15,10 @@ from lightpen.model.artefacts import Artefact, ArtefactKind, Side
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.measuring.plan import are_of_second_end, artefact_plan
 from lightpen_extensions.measure.measuring.plan_checks import problems_of
-from lightpen_extensions.measure.tasks.part import PART, Part, sizes_of
+from lightpen_extensions.measure.tasks.part import PART, Part, scale_of, sizes_of
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 from lightpen_extensions.measure.tasks.registry import measure_artefacts, size_table
 from lightpen_extensions.measure.tasks.task import Conditions
-from lightpen_extensions.measure.tasks.tip_evidence import scale_of
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]

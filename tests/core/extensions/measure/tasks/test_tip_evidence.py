@@ -12,14 +12,14 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, joint_covariance
-from lightpen_extensions.measure.tasks.tip_evidence import (
+from lightpen_extensions.measure.tasks.fixed_point import (
     TipEvidence,
     _detectable,
     judged_tip,
     points_evidence,
     tip_entries,
 )
+from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, joint_covariance
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 LIMITS = VerificationLimits()

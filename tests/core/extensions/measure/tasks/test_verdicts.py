@@ -18,8 +18,8 @@ from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.measure.tasks import drift, fixed_point
+from lightpen_extensions.measure.tasks.fixed_point import TipEvidence, judged_tip
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
-from lightpen_extensions.measure.tasks.tip_evidence import TipEvidence, judged_tip
 
 LIMITS = VerificationLimits()
 GUARD = VerificationLimits(rule=DecisionRule.GUARD_BAND)
