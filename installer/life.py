@@ -110,7 +110,7 @@ def try_entry_points(trial: Trial, version: str) -> None:
     found = trial.console("calibrate", "set 校/images", *files, *record, folder=work)
     has_tip = re.search(r"^ *joint .*[0-9]", found.output, re.MULTILINE) is not None
     trial.expect("console calibrates", found.status == 0 and has_tip, found)
-    trials = ("record.json", *files, "--monte-carlo", "20", "--workers", "2")
+    trials = ("record.json", "--monte-carlo", "20", "--workers", "2")
     again = trial.console("recalculate", *trials, folder=work)
     is_done = again.status == 0 and "20 trials" in again.output
     trial.expect("console computes in processes of its own", is_done, again)

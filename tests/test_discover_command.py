@@ -121,10 +121,11 @@ def test_a_camera_file_that_is_off_is_reported(
 def test_an_output_in_a_folder_that_does_not_exist_is_reported_first(
     centers: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    picture = ("--picture", str(centers.parent / "none" / "numbers.png"))
     length = ("--length", "longest", f"{STATION.longest}")
 
-    assert main(arguments(centers, *length, *picture)) != 0
+    *others, _ = arguments(centers, *length)
+
+    assert main([*others, str(centers.parent / "none" / "found.json")]) != 0
 
     assert "folder does not exist" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)

@@ -135,7 +135,7 @@ def commands(
     assert tip.exists(), calibrate.stderr
     return [
         by_centers,
-        ["recalculate", str(tip), *files, "--monte-carlo", "20", "--workers", "1"],
+        ["recalculate", str(tip), "--monte-carlo", "20", "--workers", "1"],
         [
             *("calibrate", str(images / "images")),
             *("--camera", str(images / "camera.yaml")),

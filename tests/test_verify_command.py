@@ -378,11 +378,10 @@ def test_calibrations_are_solved_again_and_their_uncertainty_checked(
     tmp_path: Path,
 ) -> None:
     folder = shared_data / "fixed-point"
-    inputs = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
     few = calibration_of(folder) / "calibration.json"
 
     outcome = lightpen(
-        *("recalculate", few, *inputs, "--monte-carlo", "20"),
+        *("recalculate", few, "--monte-carlo", "20"),
         *("--workers", "2", "--json", tmp_path / "again.json"),
     )
 

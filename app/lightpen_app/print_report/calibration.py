@@ -21,7 +21,6 @@ from lightpen.record.recomputing import ReestimatedPoses
 from lightpen.record.results.results import TipChange
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.phrases import grade_text, origin_text, reason_text, share_text
-from lightpen_app.look.theme import LIGHT
 from lightpen_app.look.words import (
     AXES,
     MAX_DECIMALS,
@@ -33,11 +32,11 @@ from lightpen_app.print_report.charts import charts_of
 from lightpen_app.print_report.template import (
     ANCHOR,
     Content,
-    Part,
+    Piece,
     cells,
     condition,
     environment_texts,
-    fill,
+    fill_template,
     laboratory_texts,
     markup,
     paragraph,
@@ -53,12 +52,16 @@ translate = QCoreApplication.translate
 MOST_IMAGES = 40  # number of excluded images that are named
 PX_DECIMALS = 4
 UNKNOWN = "\u2013"
-GRADE_COLORS = {
-    Grade.PASS: LIGHT.good,
-    Grade.SCALE: LIGHT.accent,
-    Grade.STEADY: LIGHT.accent,
-    Grade.CHECK: LIGHT.warn,
-    Grade.REPEAT: LIGHT.bad,
+OF_CHANGE = (  # fields of the template
+    *("since", "change", "change_u", "found", "found_u", "distance", "limit"),
+    *("unlimited", "within", "beyond"),
+)
+TONES = {  # classes of the style sheet
+    Grade.PASS: "good",
+    Grade.SCALE: "accent",
+    Grade.STEADY: "accent",
+    Grade.CHECK: "warn",
+    Grade.REPEAT: "bad",
 }
 
 
@@ -67,7 +70,7 @@ def calibration_parts(
     reestimated: ReestimatedPoses | None,
     entered: EntryPlace | None,
     laboratory: Laboratory | None = None,
-) -> tuple[Part, ...]:
+) -> tuple[Piece, ...]:
     """Return the parts of the whole report, from its title to its end mark."""
     calibration = file.calibration
     texts = {
@@ -98,7 +101,9 @@ def calibration_parts(
         "signatures": [signatures(translate("paper", "Calibrated by"))],
     }
     charts = charts_of(calibration, reestimated)
-    return fill("calibration", Content(texts, tables, charts=charts, drawn=drawn))
+    return fill_template(
+        "calibration", Content(texts, tables, charts=charts, drawn=drawn)
+    )
 
 
 def status_words(file: CalibrationFile) -> tuple[str, ...]:
@@ -110,7 +115,7 @@ def status_words(file: CalibrationFile) -> tuple[str, ...]:
     return tuple(words[each] for each in file.library_status)
 
 
-def _verdict(file: CalibrationFile) -> Part:
+def _verdict(file: CalibrationFile) -> Piece:
     word = grade_text(file.grade)
     lines = [worded(file.why)]
     if file.accepted is None:
@@ -122,13 +127,12 @@ def _verdict(file: CalibrationFile) -> Part:
     else:
         accepted = translate("paper", "The tip was accepted. Reason: {0}")
         lines.append(accepted.format(file.reason))
-    color = GRADE_COLORS[file.grade]
-    frame = f"border: 15px solid {color}"
-    return Part(
+    tone = TONES[file.grade]
+    return Piece(
         f'<table width="100%" cellspacing="0"><tr>'
-        f'<td class="verdict" style="{frame}; border-right: none" width="18%">'
-        f'<h1 style="color: {color}">{ANCHOR}{markup(word)}</h1></td>'
-        f'<td class="verdict" style="{frame}; border-left: none" valign="middle">'
+        f'<td class="verdict {tone} word" width="18%">'
+        f'<h1 class="{tone}">{ANCHOR}{markup(word)}</h1></td>'
+        f'<td class="verdict {tone} why" valign="middle">'
         f"{markup(chr(10).join(lines))}</td></tr></table>"
     )
 
@@ -204,8 +208,7 @@ def _result_texts(file: CalibrationFile) -> dict[str, str | None]:
 def _change_texts(change: TipChange | None) -> dict[str, str | None]:
     """Return the previous tip, and the deviation from it with its limit."""
     if change is None:
-        names = "since change change_u found found_u distance limit unlimited within"
-        return dict.fromkeys([*names.split(), "beyond"])
+        return dict.fromkeys(OF_CHANGE)
     u, found_u = change.expanded_uncertainty_mm, change.as_found_expanded_uncertainty_mm
     return {
         "since": f"{change.accepted:%Y-%m-%d}",

@@ -5,8 +5,10 @@ colours are defined, and nothing outside of it is needed to show it in decades.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cache
 from itertools import pairwise
+from string import Template
 
 from PySide6.QtCore import (
     QBuffer,
@@ -50,9 +52,10 @@ from lightpen_app.print_report.calibration import calibration_parts, status_word
 from lightpen_app.print_report.template import (
     ANCHOR,
     MM,
+    REPORTS,
     WIDTH,
     Drawn,
-    Part,
+    Piece,
     PrintSize,
     print_font,
     printed_text,
@@ -69,25 +72,6 @@ ROOM = PAGE_HEIGHT - TOP - BOTTOM
 HEADER, FOOTER = 11 * MM, 18 * MM  # from the upper and the lower edge
 BADGE_PADDING = 40.0
 KEEP, WITH = "keep", "with"  # first of what stands on one page, and the others
-STYLE = f"""
-    p, td {{ color: {LIGHT.text}; font-size: {PrintSize.BODY:d}px; margin: 45px 0 0 0 }}
-    h1 {{ color: {LIGHT.text}; font-size: {PrintSize.TITLE:d}px; margin: 0 }}
-    h2 {{ color: {LIGHT.text}; font-size: {PrintSize.HEADING:d}px;
-        margin: 190px 0 60px 0 }}
-    h3 {{ color: {LIGHT.text}; font-size: {PrintSize.BODY:d}px; margin: 110px 0 0 0 }}
-    p.lead {{ color: {LIGHT.muted}; font-size: {PrintSize.HEADING:d}px }}
-    p.strong {{ font-weight: bold }}
-    p.small, td.small {{ font-size: {PrintSize.SMALL:d}px }}
-    p.remark {{ color: {LIGHT.muted}; font-size: {PrintSize.SMALL:d}px }}
-    table {{ margin: 45px 0 45px 0 }}
-    td {{ padding: 10px 60px 10px 0 }}
-    td.name, td.head {{ color: {LIGHT.muted} }}
-    td.head, td.row, td.strong {{ border-bottom: 5px solid {LIGHT.line} }}
-    td.strong {{ font-weight: bold }}
-    td.signed {{ padding: 200px 0 400px 0; border-bottom: 5px solid {LIGHT.text} }}
-    td.signature {{ color: {LIGHT.muted}; font-size: {PrintSize.SMALL:d}px }}
-    td.verdict {{ padding: 60px }}
-"""
 
 
 @dataclass(frozen=True)
@@ -107,7 +91,7 @@ class PrintReport:
 
     author: str  # author in the properties of the file; may be empty
     margins: Margins
-    parts: tuple[Part, ...]
+    parts: tuple[Piece, ...]
 
 
 class _Plots(QPyTextObject):
@@ -141,7 +125,7 @@ class _Plots(QPyTextObject):
         painter.restore()
 
 
-def lay_out(parts: Sequence[Part]) -> QTextDocument:
+def lay_out(parts: Sequence[Piece]) -> QTextDocument:
     """Return parts as a document with pages of `WIDTH` and `ROOM`, in dots.
 
     Parts that belong together begin on a new page if they do not fit as a whole.
@@ -150,7 +134,7 @@ def lay_out(parts: Sequence[Part]) -> QTextDocument:
     document.setUseDesignMetrics(True)
     document.setDocumentMargin(0)
     document.setDefaultFont(print_font(PrintSize.BODY))
-    document.setDefaultStyleSheet(STYLE)
+    document.setDefaultStyleSheet(_style_sheet())
     _Plots(document, {n: plot for part in parts for n, plot in part.plots.items()})
     document.setHtml("".join(_anchored(parts)))
     document.setPageSize(QSizeF(WIDTH, ROOM))
@@ -189,9 +173,17 @@ def paint_page(
     painter.restore()
 
 
-def _anchored(parts: Iterable[Part]) -> Iterator[str]:
+@cache
+def _style_sheet() -> str:
+    """Return the style sheet of resources, filled in."""
+    template = Template((REPORTS / "report.css").read_text("utf-8"))
+    sizes = {f"size_{each.name.lower()}": str(each.value) for each in PrintSize}
+    return template.substitute(asdict(LIGHT), **sizes)
+
+
+def _anchored(parts: Iterable[Piece]) -> Iterator[str]:
     """Yield the HTML of the parts, with anchors where they are kept together."""
-    for before, part in pairwise((Part(""), *parts)):
+    for before, part in pairwise((Piece(""), *parts)):
         name = WITH if before.keeps else KEEP if part.keeps else ""
         # An anchor parts its letter from a word, so it has one that is not seen.
         anchor = f'<a name="{name}"></a>{BREAK}' if name else ""

@@ -107,7 +107,7 @@ def drawn(figure: Figure, width: float, height: float) -> Drawn:
 
 
 @dataclass(frozen=True)
-class Part:
+class Piece:
     """A part of a report as HTML, with one `ANCHOR`."""
 
     html: str
@@ -123,7 +123,7 @@ class Content:
     tables: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
     strong: Mapping[str, Sequence[int]] = field(default_factory=dict)  # bold rows
     charts: Mapping[str, Figure] = field(default_factory=dict)
-    drawn: Mapping[str, Sequence[Part]] = field(default_factory=dict)
+    drawn: Mapping[str, Sequence[Piece]] = field(default_factory=dict)
 
 
 def print_font(size: float, *, bold: bool = False) -> QFont:
@@ -151,14 +151,14 @@ def markup(text: str) -> str:
     return escape(printed_text(text), quote=False).replace("\n", "<br>")
 
 
-def paragraph(text: str, mark: str = "") -> Part:
+def paragraph(text: str, mark: str = "") -> Piece:
     """Return words, with a mark of the template; a heading keeps what follows."""
     tag, name = MARKS.get(mark, ("p", ""))
     html = f'<{tag} class="{name}">{ANCHOR}{markup(text)}</{tag}>'
-    return Part(html, keeps=tag in ("h2", "h3"))
+    return Piece(html, keeps=tag in ("h2", "h3"))
 
 
-def facts(rows: Sequence[tuple[str, str]], n_columns: int = 2) -> tuple[Part, ...]:
+def facts(rows: Sequence[tuple[str, str]], n_columns: int = 2) -> tuple[Piece, ...]:
     """Return names with their values, side by side in columns."""
     name, value = (
         share / n_columns for share in ((44, 56) if n_columns > 1 else (22, 78))
@@ -179,7 +179,7 @@ def table(
     *,
     strong: Sequence[int] = (),
     name: str = "",
-) -> tuple[Part, ...]:
+) -> tuple[Piece, ...]:
     """Return a table whose header is repeated on each page; strong rows are bold.
 
     The widths are shares; what begins with > is right-aligned. The class of the cells
@@ -200,16 +200,16 @@ def table(
     return _table_of(line(titles, "head"), lines)
 
 
-def _table_of(head: str, lines: Sequence[str]) -> tuple[Part, ...]:
+def _table_of(head: str, lines: Sequence[str]) -> tuple[Piece, ...]:
     if not lines:
         return ()
     first = lines[0].replace(">", f">{ANCHOR}", 1)
     body = "".join(f"<tr>{line}</tr>" for line in (first, *lines[1:]))
     head = f"<thead><tr>{head}</tr></thead>" if head else ""
-    return (Part(f'<table width="100%" cellspacing="0">{head}{body}</table>'),)
+    return (Piece(f'<table width="100%" cellspacing="0">{head}{body}</table>'),)
 
 
-def charts(plots: Mapping[str, Figure], height: float) -> tuple[Part, ...]:
+def charts(plots: Mapping[str, Figure], height: float) -> tuple[Piece, ...]:
     """Return plots side by side, dots high."""
     if not plots:
         return ()
@@ -223,7 +223,7 @@ def charts(plots: Mapping[str, Figure], height: float) -> tuple[Part, ...]:
     return (replace(part, plots=made),)
 
 
-def signatures(by: str) -> Part:
+def signatures(by: str) -> Piece:
     """Return the fields for signatures, the first with a title."""
     below = markup(translate("paper", "Name, date, signature"))
     names = "".join(
@@ -234,9 +234,9 @@ def signatures(by: str) -> Part:
     return _table_of("", [names, fields])[0]
 
 
-def fill(section: str, content: Content) -> tuple[Part, ...]:
+def fill_template(section: str, content: Content) -> tuple[Piece, ...]:
     """Return the parts of a section in the language of the window."""
-    parts: list[Part] = []
+    parts: list[Piece] = []
     keeps = False
     for stanza in _sections(QLocale().name())[section].split("\n\n"):
         head, *lines = stanza.splitlines()
@@ -275,10 +275,10 @@ def _parts(
     words: Sequence[str],
     lines: Sequence[str],
     content: Content,
-) -> Iterable[Part]:
+) -> Iterable[Piece]:
     match command:
         case ":include":
-            return fill(words[0], content)
+            return fill_template(words[0], content)
         case ":draw":
             return content.drawn[words[0]]
         case ":charts":
@@ -303,7 +303,7 @@ def _parts(
 
 def _table(
     kind: str, name: str, widths: Sequence[str], lines: Sequence[str], content: Content
-) -> tuple[Part, ...]:
+) -> tuple[Piece, ...]:
     """Return a table of the rows of its name, and of lines below its titles."""
     title, *below = lines
     rows, strong = list(content.tables.get(name, ())), [*content.strong.get(name, ())]

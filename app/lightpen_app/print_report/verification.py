@@ -24,11 +24,11 @@ from lightpen_app.look.words import number_text
 from lightpen_app.print_report.pages import Margins, PrintReport
 from lightpen_app.print_report.template import (
     Content,
-    Part,
+    Piece,
     condition,
     environment_texts,
     facts,
-    fill,
+    fill_template,
     laboratory_texts,
     paragraph,
     proof_texts,
@@ -50,7 +50,7 @@ FIGURES = (
 )
 
 
-def part_parts(record: Mapping[str, Any]) -> tuple[Part, ...]:
+def part_pieces(record: Mapping[str, Any]) -> tuple[Piece, ...]:
     """Return characteristics, budget, features, alignment, points and plan."""
     characteristics, alignment = record["characteristics"], record["alignment"]
     rejected = [i for i, e in enumerate(characteristics) if e["decision"] == "rejected"]
@@ -80,7 +80,7 @@ def part_parts(record: Mapping[str, Any]) -> tuple[Part, ...]:
         ],
     }
     strong = {"characteristics": rejected}
-    return fill("part", Content(texts, tables, strong, charts=plots))
+    return fill_template("part", Content(texts, tables, strong, charts=plots))
 
 
 def _text(value: float | None) -> str:
@@ -214,10 +214,10 @@ def verification_print_report(
         "files": _file_rows(inputs),
     }
     drawn = {
-        "figures": part_parts(record) if is_part else tuple(_figures(record)),
+        "figures": part_pieces(record) if is_part else tuple(_figures(record)),
         "signatures": [signatures(by)],
     }
-    parts = fill("verification", Content(texts, tables, drawn=drawn))
+    parts = fill_template("verification", Content(texts, tables, drawn=drawn))
     items = (each or "\u2013" for each in (done.pen, done.tip, done.verification))
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
     margins = Margins(
@@ -246,8 +246,8 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
 
 def _verdict_texts(done: StoredVerification, verdict: Any) -> dict[str, str | None]:
     if done.verdict is None or not isinstance(verdict, Mapping):
-        names = "grade why rule limited reason"
-        return {"unjudged": "", **dict.fromkeys(names.split())}
+        of_verdict = ("grade", "why", "rule", "limited", "reason")
+        return {"unjudged": "", **dict.fromkeys(of_verdict)}
     return {
         "unjudged": None,
         "grade": grade_text(Grade(done.verdict.grade)),
@@ -258,7 +258,7 @@ def _verdict_texts(done: StoredVerification, verdict: Any) -> dict[str, str | No
     }
 
 
-def _figures(record: Mapping[str, Any]) -> Iterator[Part]:
+def _figures(record: Mapping[str, Any]) -> Iterator[Piece]:
     yield paragraph(translate("paper", "Figures, as the JSON file names them"), "# ")
     yield from _values(record)
     for name, value in record.items():
@@ -275,7 +275,7 @@ def _figures(record: Mapping[str, Any]) -> Iterator[Part]:
     yield from _tables(record)
 
 
-def _values(of: Mapping[str, Any]) -> tuple[Part, ...]:
+def _values(of: Mapping[str, Any]) -> tuple[Piece, ...]:
     """Return numbers, words, and short lists of numbers."""
     rows = [
         (_title(name), _plain(name, value))
@@ -285,7 +285,7 @@ def _values(of: Mapping[str, Any]) -> tuple[Part, ...]:
     return facts(rows, n_columns=1) if rows else ()
 
 
-def _tables(of: Mapping[str, Any]) -> Iterator[Part]:
+def _tables(of: Mapping[str, Any]) -> Iterator[Piece]:
     """Yield points, and longer lists of numbers."""
     for name, value in of.items():
         if name in ELSEWHERE or _is_short(value):

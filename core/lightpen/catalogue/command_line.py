@@ -38,7 +38,6 @@ MESSAGES = {
     "cli.pen-over-raw": "{out} would replace its input, the measured LEDs. Give the LED file another name.",
     "cli.out-over-input": "--out {out} would replace the input file of that name. Give the new LED file another name.",
     "cli.swing-of-another-pen": "{result} was calibrated with the LED file {its_pen}, not with --pen {pen}. Give that file, and only calibrations with it.",
-    "cli.result-of-other-files": "{result} was calibrated with other files than --camera {camera} and --pen {pen}. Give the files of its calibration.",
     "cli.another-tip": "{other} is a calibration of tip {its}, {first} of tip {tip}. Give calibrations of one tip.",
     "stream.another-size": "The images have {width} x {height} px; the intrinsics are for {its_width} x {its_height} px. Give the intrinsics file of these images.",
     "library.no-entry": "'{entry}' is not an entry of a {kind}. Give --set ENTRY=VALUE with one of {known}.",

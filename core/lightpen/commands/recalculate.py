@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.commands.arguments import add_camera_and_pen, add_json, whole_number
+from lightpen.commands.arguments import add_json, whole_number
 from lightpen.commands.console import (
     printing,
     progress,
@@ -15,7 +15,6 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.comparisons.led_file import calibrate_again
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import (
     MIN_TRIALS,
@@ -23,13 +22,9 @@ from lightpen.estimation.monte_carlo import (
     local_workers,
     run_monte_carlo,
 )
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import sha256
 from lightpen.formats.own_json import plain
-from lightpen.formats.pen_files import read_pen
-from lightpen.model.camera import Camera
-from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.recomputing import recompute
 
 TITLE, COLUMN = 30, 13  # characters
 
@@ -50,7 +45,6 @@ def add_recalculate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "results", nargs="+", type=Path, metavar="RESULT.json", help="calibrations"
     )
-    add_camera_and_pen(parser)
     parser.add_argument(
         "--monte-carlo",
         type=_n_trials,
@@ -75,57 +69,33 @@ def _n_trials(text: str) -> int:
 
 @printing
 def _recalculate(options: argparse.Namespace) -> None:
-    require_other_file(options.json, *options.results, options.camera, options.pen)
-    camera = read_camera(options.camera)
-    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    require_other_file(options.json, *options.results)
     files = [read_calibration(path) for path in options.results]
-    _require_files(files, options)
+    trials = {}
     with (
         local_workers(options.workers) as in_workers,
         progress("Calculating") as report,
     ):
-        solved = in_workers(_Solve(camera, pen), files, report)
-        trials = {}
-        if options.monte_carlo is not None:
-            for file in files:
-                trials[file.path.name] = run_monte_carlo(
-                    calibrate_again(file, camera, pen),
-                    options.monte_carlo,
-                    in_workers,
-                    report,
-                )
+        solved = in_workers(_recalculated, files, report)
+        for path in options.results if options.monte_carlo is not None else ():
+            found = recompute(path)
+            if found.inputs.rig is not None:
+                raise UsageError("led-file.of-rig", path=path)
+            trials[path.name] = run_monte_carlo(
+                found.calibration, options.monte_carlo, in_workers, report
+            )
     print(shown(_text(solved, trials)))
     if options.json is not None:
         write_record(options.json, _record(solved, trials))
 
 
-@dataclass(frozen=True, eq=False)
-class _Solve:
-    """Solves calibrations with the same files, in another process."""
-
-    camera: Camera
-    pen: Pen
-
-    def __call__(self, file: CalibrationFile) -> Recalculated:
-        name = file.path.name
-        try:
-            tip = calibrate_again(file, self.camera, self.pen).joint.tip_pen
-        except CalibrationError as error:
-            return Recalculated(name, None, None, str(error.message))
-        return Recalculated(name, tip, tip - file.tip_pen)
-
-
-def _require_files(files: list[CalibrationFile], options: argparse.Namespace) -> None:
-    """Reject calibrations with other input files."""
-    given = sha256(options.camera), sha256(options.pen)
-    for file in files:
-        if (file.camera_sha256, file.pen_sha256) != given:
-            raise UsageError(
-                "cli.result-of-other-files",
-                result=file.path,
-                camera=options.camera,
-                pen=options.pen,
-            )
+def _recalculated(file: CalibrationFile) -> Recalculated:
+    """Return a calibration solved again by its record alone, in another process."""
+    try:
+        tip = recompute(file.path).calibration.joint.tip_pen
+    except (CalibrationError, UsageError) as error:
+        return Recalculated(file.path.name, None, None, str(error.message))
+    return Recalculated(file.path.name, tip, tip - file.tip_pen)
 
 
 def _text(solved: list[Recalculated], trials: dict[str, MonteCarlo]) -> str:

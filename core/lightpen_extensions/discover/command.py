@@ -24,7 +24,7 @@ from lightpen.commands.console import (
 )
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import require_folder_of, write_whole
+from lightpen.formats.files import require_folder_of
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.formats.rig_files import write_camera
@@ -32,11 +32,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import DISC_DIAMETER, Pen, check_leds
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import require_lens
-from lightpen_extensions.discover.report import (
-    discovery_record,
-    discovery_text,
-    picture_of_pen,
-)
+from lightpen_extensions.discover.report import discovery_record, discovery_text
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import (
     Report,
@@ -108,9 +104,6 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     for name, what in (("pen", "LED file"), ("camera", "intrinsics file")):
         suffix = "json" if name == "pen" else "yaml"
         add_file(parser, f"--out-{name}", f"FILE.{suffix}", f"write the {what}")
-    add_file(
-        parser, "--picture", "FILE.png", "draw the pen with the numbers of its LEDs"
-    )
     add_json(parser)
 
 
@@ -150,8 +143,6 @@ def _discover(options: argparse.Namespace) -> None:
         write_pen(found.pen, options.out_pen)
     if options.out_camera is not None:
         write_camera(found.camera, options.out_camera)
-    if options.picture is not None:
-        write_whole(options.picture, picture_of_pen(found))
     if options.json is not None:
         write_record(options.json, discovery_record(found))
     print(shown(discovery_text(found)))
@@ -183,7 +174,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs in no folder, over an input or each other, or of other suffix."""
     inputs = (options.centers, options.camera, options.pen, options.pen_sketch)
     seen: list[Path] = []
-    outputs = (options.out_pen, options.out_camera, options.picture, options.json)
+    outputs = (options.out_pen, options.out_camera, options.json)
     for path in outputs:
         if path is None:
             continue
@@ -194,7 +185,6 @@ def _check_outputs(options: argparse.Namespace) -> None:
     for path, suffixes in (
         (options.out_pen, (".json",)),
         (options.out_camera, (".yaml", ".yml")),
-        (options.picture, (".png",)),
     ):
         if path is not None and path.suffix.lower() not in suffixes:
             raise UsageError(

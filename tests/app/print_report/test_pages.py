@@ -8,7 +8,7 @@ from PySide6.QtGui import QTextDocument
 
 from lightpen_app.look.words import unbroken
 from lightpen_app.print_report.pages import ROOM, lay_out
-from lightpen_app.print_report.template import Part, charts, paragraph, table
+from lightpen_app.print_report.template import Piece, charts, paragraph, table
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import LinePlot
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("qapp")
 N_LINES = 44  # paragraphs of a line that fit on a page
 
 
-def lines(n: int) -> tuple[Part, ...]:
+def lines(n: int) -> tuple[Piece, ...]:
     return tuple(paragraph(f"line {i}") for i in range(n))
 
 

@@ -13,28 +13,28 @@ from lightpen_app.print_report.template import (
     REPORTS,
     SECTION,
     Content,
-    Part,
+    Piece,
     condition,
-    fill,
+    fill_template,
 )
 from lightpen_resources import languages
 
 SHOWN = re.compile(r"^(:.*|\[.*\])$", re.MULTILINE)
-Fill = Callable[[str, Content], tuple[Part, ...]]
+Fill = Callable[[str, Content], tuple[Piece, ...]]
 
 
 @pytest.fixture
 def fill_lines(monkeypatch: pytest.MonkeyPatch, qapp: QApplication) -> Fill:
     """Return a function that fills lines of a template."""
 
-    def filled(lines: str, content: Content) -> tuple[Part, ...]:
+    def filled(lines: str, content: Content) -> tuple[Piece, ...]:
         monkeypatch.setattr(template, "_sections", lambda _: {"lines": lines})
-        return fill("lines", content)
+        return fill_template("lines", content)
 
     return filled
 
 
-def n_lines(parts: tuple[Part, ...]) -> int:
+def n_lines(parts: tuple[Piece, ...]) -> int:
     return sum(part.html.count("<tr>") for part in parts)
 
 
