@@ -446,8 +446,9 @@ class SupervisorFields(Translated, QWidget):
         super().__init__(parent)
 
         # Widgets
-        self._name = EnterEdit()
-        self._password = EnterEdit()
+        self._name = self.say(EnterEdit(), hint=self.tr("Supervisor"))
+        password = self.tr("Supervisor password")
+        self._password = self.say(EnterEdit(), hint=password)
         self._password.setEchoMode(QLineEdit.EchoMode.Password)
 
         # Layout
@@ -458,8 +459,6 @@ class SupervisorFields(Translated, QWidget):
             edit.setMaxLength(LONGEST)
             edit.textChanged.connect(self.value_edited)
         self._password.returnPressed.connect(self.entered)
-
-        self._retranslate()
 
     def value(self) -> Signature:
         """Return the signature."""
@@ -478,12 +477,3 @@ class SupervisorFields(Translated, QWidget):
         """Have the password typed again."""
         self._password.clear()
         give_focus(self._password)
-
-    @override
-    def _retranslate(self) -> None:
-        for edit, words in (
-            (self._name, self.tr("Supervisor")),
-            (self._password, self.tr("Supervisor password")),
-        ):
-            edit.setPlaceholderText(words)
-            edit.setAccessibleName(words)

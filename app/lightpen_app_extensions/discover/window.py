@@ -73,7 +73,11 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._length = NumberField("mm", (0.0, LONGEST), 4)
         self._u = NumberField("mm", (0.0001, LARGEST_U), 4)
         self._disc = NumberField("mm", (0.1, LARGEST_DISC), 2)
-        self._names = [text_label(TextSize.BODY) for _ in range(3)]
+        names = (
+            self.tr("Distance of the LEDs"),
+            self.tr("U (k = 2) of distance"),
+            self.tr("Disc diameter"),
+        )
         self._compute = PushButton()
         self._facts = text_label(TextSize.BODY)
         self._save = self.make_button(self.tr("Save both files and calibrate the tip"))
@@ -87,10 +91,11 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         fill(side, self._count, self._dial, self._pen, self._how)
         grid = grid_layout(side, spacing=(GRID, GRID // 2))
         fields = (self._length, self._u, self._disc)
-        for row, (name, edit) in enumerate(zip(self._names, fields, strict=True)):
-            grid.addWidget(name, row, 0)
+        for row, (name, edit) in enumerate(zip(names, fields, strict=True)):
+            label = self.say(text_label(TextSize.BODY), name)
+            grid.addWidget(label, row, 0)
             grid.addWidget(edit, row, 1)
-            name.setBuddy(edit)
+            label.setBuddy(edit)
         fill(side, self._facts, 1)
         for picture in (self._dial, self._pen):
             picture.setFixedHeight(PICTURE_HEIGHT)
@@ -162,16 +167,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _retranslate(self) -> None:
         self._image.set_message(self.tr("No image"))
         self._length.set_empty_text(self.tr("Not specified"))
-        for label, name in zip(
-            self._names,
-            (
-                self.tr("Distance of the LEDs"),
-                self.tr("U (k = 2) of distance"),
-                self.tr("Disc diameter"),
-            ),
-            strict=True,
-        ):
-            label.setText(name)
         self._show_found()
 
     def _refresh(self) -> None:

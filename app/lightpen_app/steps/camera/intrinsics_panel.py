@@ -56,7 +56,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._swing: Solution | None = None
 
         # Widgets
-        self._path = PathField()
+        self._path = self.say(PathField(), hint=self.tr("Intrinsics file"))
         self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
         self._part = self.make_button(
@@ -78,7 +78,16 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._check = SignLabel()
         self._doubt = SignLabel()
         self._by_pen = SignLabel()
-        self._names = [text_label(TextSize.SMALL, Tone.QUIET) for _ in range(N_FACTS)]
+        facts = (
+            self.tr("In use"),
+            self.tr("Focal lengths"),
+            self.tr("Principal point"),
+            self.tr("Distortion"),
+            self.tr("Calibrated"),
+        )
+        self._names = [
+            self.say(text_label(TextSize.SMALL, Tone.QUIET), name) for name in facts
+        ]
         self._facts = [text_label(TextSize.SMALL) for _ in range(N_FACTS)]
 
         # Layout
@@ -150,21 +159,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
         )
 
     def _retranslate(self) -> None:
-        edit = self._path.edit
-        edit.setAccessibleName(self.tr("Intrinsics file"))
-        edit.setPlaceholderText(self.tr("Intrinsics file"))
-        for label, name in zip(
-            self._names,
-            (
-                self.tr("In use"),
-                self.tr("Focal lengths"),
-                self.tr("Principal point"),
-                self.tr("Distortion"),
-                self.tr("Calibrated"),
-            ),
-            strict=True,
-        ):
-            label.setText(name)
         self._refresh()
 
     def _refresh(self) -> None:

@@ -41,8 +41,8 @@ class RigPanel(Translated, QGroupBox):
         self._n_unpaired: int | None = None
 
         # Widgets
-        self._second = QCheckBox()
-        self._path = PathField()
+        self._second = self.say(QCheckBox(), self.tr("Use a second camera"))
+        self._path = self.say(PathField(), hint=self.tr("Rig file"))
         self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
         self._problem = SignLabel()
@@ -111,12 +111,6 @@ class RigPanel(Translated, QGroupBox):
         )
 
     def _retranslate(self) -> None:
-        asked = self.tr("Use a second camera")
-        self._second.setText(asked)
-        self._second.setAccessibleName(asked)
-        edit = self._path.edit
-        edit.setAccessibleName(self.tr("Rig file"))
-        edit.setPlaceholderText(self.tr("Rig file"))
         self._refresh()
 
     def _refresh(self) -> None:

@@ -120,7 +120,7 @@ class SourcePanel(Translated, QGroupBox):
         self._kind.setMinimumWidth(22 * GRID)  # the placeholder would widen it
         for _ in self._sources:
             self._kind.addItem("")
-        self._place = PathField()
+        self._place = self.say(PathField(), hint=self.tr("Folder, record or video"))
         self._pick = self.make_button(self.tr("Open..."))
         self._pick.setProperty("menu", True)
         self._place.add_button(self._pick)
@@ -128,7 +128,11 @@ class SourcePanel(Translated, QGroupBox):
         self._folder = self.say(menu.addAction(""), self.tr("Folder or record..."))
         self._file = self.say(menu.addAction(""), self.tr("Video..."))
         self._pick.setMenu(menu)
-        self._producer = PathField()
+        self._producer = self.say(
+            PathField(),
+            hint=self.tr("GenTL producers of the system"),
+            name=self.tr("GenTL producer"),
+        )
         self._open_producer = self.make_button(
             self.tr("Open..."), self._on_open_producer_clicked
         )
@@ -373,12 +377,6 @@ class SourcePanel(Translated, QGroupBox):
         self._kind.setAccessibleName(title)
         # On Linux the accessible name of a drop-down list is its current choice.
         self._kind.setAccessibleDescription(title)
-        edit = self._place.edit
-        edit.setAccessibleName(self.tr("Folder, record or video"))
-        edit.setPlaceholderText(self.tr("Folder, record or video"))
-        producer = self._producer.edit
-        producer.setAccessibleName(self.tr("GenTL producer"))
-        producer.setPlaceholderText(self.tr("GenTL producers of the system"))
         self._device.set_name(self.tr("Serial number or address"))
         self._refresh()
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
@@ -59,9 +58,10 @@ class ArchivePanel(Translated, QWidget):
         self._save = self.make_button(self.tr("Save..."))
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
-        self._savings: dict[SaveFormat, QAction] = {
-            saving: menu.addAction("") for saving in SaveFormat
-        }
+        texts = (
+            self.tr("Listed entries (CSV)..."),
+            self.tr("All entries (JSON lines)..."),
+        )
         self._save.setMenu(menu)
         self.progress = JobProgress()
         self._delivered = SignLabel()
@@ -75,8 +75,8 @@ class ArchivePanel(Translated, QWidget):
 
         # Connections
         self.progress.cancelled.connect(self.cancel_requested)
-        for saving, action in self._savings.items():
-            action.triggered.connect(
+        for saving, text in zip(SaveFormat, texts, strict=True):
+            self.say(menu.addAction(""), text).triggered.connect(
                 lambda _=False, saving=saving: self.save_requested.emit(saving)
             )
 
@@ -107,11 +107,6 @@ class ArchivePanel(Translated, QWidget):
         return [label.value() for label in labels if label.value().text]
 
     def _retranslate(self) -> None:
-        for saving, text in (
-            (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
-            (SaveFormat.WHOLE, self.tr("All entries (JSON lines)...")),
-        ):
-            self._savings[saving].setText(text)
         self._refresh_buttons()
         self._show_delivery()
         self._show_outcome()

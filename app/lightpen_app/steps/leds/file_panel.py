@@ -60,7 +60,11 @@ class LedFilePanel(Translated, QWidget):
 
         # Widgets
         self._label = self.say(QLabel(), self.tr("LED &file"))
-        self._path = PathField()
+        self._path = self.say(
+            PathField(),
+            hint=self.tr("Table (CSV) or JSON file"),
+            name=self.tr("LED file"),
+        )
         self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
         self._save = self.make_button(self.tr("Save as..."), self._on_save_clicked)
@@ -232,8 +236,6 @@ class LedFilePanel(Translated, QWidget):
         self._path.set_value(self._value)
 
     def _retranslate(self) -> None:
-        self._path.edit.setAccessibleName(self.tr("LED file"))
-        self._path.edit.setPlaceholderText(self.tr("Table (CSV) or JSON file"))
         self.set_exchange(self._pair)
         self._refresh_save_words()
 

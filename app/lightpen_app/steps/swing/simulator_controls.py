@@ -30,9 +30,10 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         # Widgets
         self._follow = PushButton(checkable=True)
         self._follow.setProperty("inviting", True)
-        others = self.tr("What else the simulated operator can do with the pen")
-        self._more = self.make_button(self.tr("Other movements"), tip=others)
-        self._more.setAccessibleDescription(others)
+        self._more = self.make_button(
+            self.tr("Other movements"),
+            tip=self.tr("What else the simulated operator can do with the pen"),
+        )
         self._more.setProperty("menu", True)
         menu = QMenu(self._more)
         menu.setToolTipsVisible(True)
