@@ -6222,14 +6222,6 @@ needed</source>
         <translation>图像相对于内参文件旋转了 180 度：只有转回来，文件中的主点才与图像相符。请使用相机原样输出的图像，或使用按此安装方式标定的相机内参。</translation>
     </message>
     <message>
-        <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen and is in mm, or measure the pen again.</source>
-        <translation>图像与 LED 文件矛盾：{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查文件是否属于这支光笔且以 mm 为单位，或重新测量光笔。</translation>
-    </message>
-    <message>
-        <source>The images contradict the rig file or the scale of the LED file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the rig file (k = 2). A wrong base looks like a wrong scale. Check that no camera was moved and that both files belong together, then measure the pen or calibrate the rig again.</source>
-        <translation>图像与相机组文件或 LED 文件的尺度矛盾：相机 {camera} 的{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，相机组文件为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。错误的基线与错误的尺度表现相同。请检查相机未被移动且两个文件配套，然后重新测量光笔或标定相机组。</translation>
-    </message>
-    <message>
         <source>The joint fit did not converge. {cause}</source>
         <translation>联合拟合未收敛。{cause}</translation>
     </message>
@@ -8298,6 +8290,22 @@ needed</source>
         <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
     </message>
     <message>
+        <source>The images contradict the LED file: {numbers}. Check that the file belongs to this pen and is in mm, or measure the pen again.</source>
+        <translation>图像与 LED 文件矛盾：{numbers}。请检查文件是否属于这支光笔且以 mm 为单位，或重新测量光笔。</translation>
+    </message>
+    <message>
+        <source>The images contradict the intrinsics file: {numbers}. Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与内参文件矛盾：{numbers}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The images contradict the rig file in camera {camera}: {numbers}. Check that no camera was moved, or calibrate the rig again.</source>
+        <translation>图像与相机组文件中相机 {camera} 的数值矛盾：{numbers}。请检查是否有相机被移动，或重新标定相机组。</translation>
+    </message>
+    <message>
+        <source>The images contradict the rig file or the scale of the LED file in camera {camera}: {numbers}. A wrong base looks like a wrong scale. Check that no camera was moved and that both files belong together, then measure the pen or calibrate the rig again.</source>
+        <translation>图像与相机组文件中相机 {camera} 的数值或 LED 文件的尺度矛盾：{numbers}。错误的基线与错误的尺度表现相同。请检查相机未被移动且两个文件配套，然后重新测量光笔或标定相机组。</translation>
+    </message>
+    <message>
         <source>The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.</source>
         <translation>图像不能区分光笔及其镜像。请将光笔朝向和背离相机进一步倾斜 30 度或以上，并靠近相机。</translation>
     </message>
@@ -9282,18 +9290,6 @@ needed</source>
         <translation>漂移参考点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
     </message>
     <message>
-        <source>The images contradict the intrinsics file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
-        <translation>图像与内参文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
-        <translation>图像与相机 {camera} 的文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The images contradict the rig file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that no camera was moved, or calibrate the rig again.</source>
-        <translation>图像与相机组文件矛盾：相机 {camera} 的 {what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查是否有相机被移动，或重新标定相机组。</translation>
-    </message>
-    <message>
         <source>The key of the station with chain {chain} is not in this user account; nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
         <translation>链 {chain} 所属工位的密钥不在此用户账户中；无法签名。请使用该工位的账户和计算机、将密钥复制到此处，或由主管引入新密钥（见文档：security）。</translation>
     </message>
@@ -9432,6 +9428,10 @@ needed</source>
     <message>
         <source>{usable}; the tip needs at least {needed}. {advice}</source>
         <translation>{usable}；求测头至少需要 {needed} 幅。{advice}</translation>
+    </message>
+    <message>
+        <source>{what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2)</source>
+        <translation>{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)</translation>
     </message>
     <message>
         <source>{where} Check that the file matches the current camera positions and that the images are in the order of its cameras, or calibrate the rig again.</source>

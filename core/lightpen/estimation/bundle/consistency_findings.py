@@ -58,7 +58,6 @@ class Contradiction:
     @property
     def message(self) -> Message:
         """The message to the user."""
-        unit = f" {self.unit}" if self.unit else ""
         wanted = _known_digits(self.estimated, self.estimated_uncertainty)
         if self.of_pen and self.of_rig:
             return message(
@@ -67,62 +66,27 @@ class Contradiction:
                 wanted_u=self.estimated_uncertainty,
                 stated_u=self.stated_uncertainty,
             )
-        if self.of_pen:
-            return message(
-                "warning.pen-file-contradicted",
-                what=self.what,
-                wanted=wanted,
-                wanted_u=self.estimated_uncertainty,
-                stated=self.stated,
-                stated_u=self.stated_uncertainty,
-                unit=unit,
-            )
-        if self.is_turned:
-            turned = message("warning.images-turned")
-            return of_camera(self.camera, turned) if self.camera else turned
-        if not self.camera:
-            return message(
-                "warning.camera-file-contradicted",
-                what=self.what,
-                wanted=wanted,
-                wanted_u=self.estimated_uncertainty,
-                stated=self.stated,
-                stated_u=self.stated_uncertainty,
-                unit=unit,
-            )
-        if not self.of_rig:
-            return message(
-                "warning.camera-file-of-rig-contradicted",
-                camera=self.camera,
-                what=self.what,
-                wanted=wanted,
-                wanted_u=self.estimated_uncertainty,
-                stated=self.stated,
-                stated_u=self.stated_uncertainty,
-                unit=unit,
-            )
-        change = abs(self.estimated - self.stated)
-        if self.what.code == BASE and change < AS_SCALE * abs(self.stated):
-            return message(
-                "warning.base-contradicted",
-                camera=self.camera,
-                what=self.what,
-                wanted=wanted,
-                wanted_u=self.estimated_uncertainty,
-                stated=self.stated,
-                stated_u=self.stated_uncertainty,
-                unit=unit,
-            )
-        return message(
-            "warning.rig-file-contradicted",
-            camera=self.camera,
+        numbers = message(
+            "warning.contradicted-numbers",
             what=self.what,
             wanted=wanted,
             wanted_u=self.estimated_uncertainty,
             stated=self.stated,
             stated_u=self.stated_uncertainty,
-            unit=unit,
+            unit=f" {self.unit}" if self.unit else "",
         )
+        if self.of_pen:
+            return message("warning.pen-file-contradicted", numbers=numbers)
+        camera, change = self.camera, abs(self.estimated - self.stated)
+        if self.is_turned:
+            turned = message("warning.images-turned")
+            return of_camera(camera, turned) if camera else turned
+        if not self.of_rig:
+            found = message("warning.camera-file-contradicted", numbers=numbers)
+            return of_camera(camera, found) if camera else found
+        if self.what.code == BASE and change < AS_SCALE * abs(self.stated):
+            return message("warning.base-contradicted", camera=camera, numbers=numbers)
+        return message("warning.rig-file-contradicted", camera=camera, numbers=numbers)
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,7 +126,6 @@ _CAUSES = {
 _BY_CAUSE = {
     **{advice.code: step for advice, step in _CAUSES.values()},
     "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
-    "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,
     "warning.images-turned": NextStep.CHECK_CAMERA,
     "warning.rig-file-contradicted": NextStep.CHECK_RIG,
     "warning.base-contradicted": NextStep.CHECK_FILES,
