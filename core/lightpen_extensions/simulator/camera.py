@@ -29,8 +29,6 @@ from lightpen.swing.capture.state import Phase, SwingState
 from lightpen_extensions.simulator.hand import HandPose, Operator
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
-    camera_turn,
-    lamps_beside,
     led_faces,
     led_gains,
     render_plan,
@@ -92,7 +90,6 @@ BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
 
 N_BUFFERED = 16  # images that wait for a late reader, as with real cameras
 MAX_POSES = 64  # through one exposure
-TURNING_TIME = 60.0  # s, for the whole rotation of the camera in the scene
 STILL = 0.02  # px moved during the exposure that blur hides
 
 
@@ -338,11 +335,7 @@ class SimulatedCamera:
             shown = self._poses(scene, self.operator.held(between))
         gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
         gains[[led - 1 for led in held.covered]] = 0
-        share = float(times[1]) / TURNING_TIME
-        turn = camera_turn(scene, share)
-        shown = turn @ shown[0], shown[1] @ turn.T
-        lamps = (*self._lamps, *lamps_beside(scene, share))
-        view = View(*shown, gains, lamps, faces=self._faces)
+        view = View(*shown, gains, self._lamps, faces=self._faces)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
 
     def _poses(self, scene: Scene, held: HandPose) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,6 @@ LED_DIAMETERS = (2.0, 12.0)  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
 BLURS = (0.3, 8.0)  # px, of simulated optics
-LARGEST_SHIFT = 10.0  # px, of simulated images
 MAX_RENDERED = 30_000  # images
 
 
@@ -92,18 +91,6 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         help="distance from the first to the last camera",
     )
     parser.add_argument(
-        "--lamp",
-        action="store_true",
-        help="fixed lamp in view, to detect camera motion",
-    )
-    parser.add_argument(
-        "--camera-turn",
-        type=number_from(0.0, LARGEST_SHIFT, "shift", "px"),
-        default=0.0,
-        metavar="PX",
-        help="image shift during the swing due to camera rotation",
-    )
-    parser.add_argument(
         "--pen",
         choices=("paper", "six", "eight", "near-symmetric", "fanned"),
         default="paper",
@@ -144,8 +131,6 @@ def _simulate(options: argparse.Namespace) -> None:
         sensor=Sensor(bits=options.bits),
         faces=looks.faces,
         optics=replace(looks.optics, psf_sigma=options.blur),
-        has_lamp=options.lamp,
-        camera_turn=options.camera_turn,
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
         camera=paper_camera(options.binning),
     )

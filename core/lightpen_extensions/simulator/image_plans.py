@@ -12,7 +12,7 @@ from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
+from lightpen.model.rigid import Rig, rig_of
 from lightpen_extensions.simulator.faces import Dome, Face, HotSpot, Ring
 from lightpen_extensions.simulator.render import render_view
 from lightpen_extensions.simulator.scenes import Scene, expose
@@ -26,7 +26,6 @@ from lightpen_extensions.simulator.swings import (
     swing_poses,
 )
 from lightpen_extensions.simulator.view import (
-    Lamp,
     Optics,
     View,
     moving_poses,
@@ -44,10 +43,6 @@ DOME_HEIGHT, DOME_DARKENING = 0.35, 0.75
 RING_INNER, RING_SOFTNESS, RING_MIDDLE = 0.55, 0.12, 0.15
 MAX_MISSING = 4
 MOTION = (2.0, 12.0)  # px moved during the exposure
-LAMP_PLACE = (0.1, 0.12)  # of width and height of the image
-LAMP_RADIUS = 0.004  # of its width
-LAMP_LEVEL = 0.6
-TURN = (0.8, 0.6)  # of the image's shift, to the right and down
 DEFOCUS = (2.0, 5.0)  # px, radius of the blur disc
 SATURATED_EXPOSURE = (1.6, 3.0)
 DIM_EXPOSURE = (0.1, 0.25)
@@ -134,7 +129,6 @@ def plan_rig(scene: Scene, rig: Rig) -> tuple[ScenePlan, ...]:
     for c, (camera, R, t) in enumerate(stands):
         there = seen_from(swing, R, t)
         seen = replace(scene, camera=camera, cone_cam=there.cone_cam, viewpoint=c)
-        there = _turned(there, seen)
         image_plans = tuple(
             _plan_image(seen, there, gains, index, flags[index])
             for index in range(scene.n_images)
@@ -173,40 +167,6 @@ def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
     distance, direction = rng.uniform(*HOT_DISTANCE), rng.uniform(0, 2 * np.pi)
     place = distance * np.cos(direction), distance * np.sin(direction)
     return HotSpot(place, rng.uniform(*HOT_WIDTH), rng.uniform(*HOT_SHARE))
-
-
-def _turned(swing: Swing, scene: Scene) -> Swing:
-    """Return a swing as seen by a camera that turns between images."""
-    shares = [_share(scene, index) for index in range(len(swing))]
-    turns = np.array([camera_turn(scene, share) for share in shares])
-    return replace(
-        swing,
-        rotations=turns @ swing.rotations,
-        translations=np.einsum("nij,nj->ni", turns, swing.translations),
-        tips_cam=np.einsum("nij,nj->ni", turns, swing.tips_cam),
-    )
-
-
-def _share(scene: Scene, index: int) -> float:
-    """Return the progress of the swing in an image, -0.5 to 0.5."""
-    return index / max(scene.n_images - 1, 1) - 0.5
-
-
-def camera_turn(scene: Scene, share: float) -> FloatArray:
-    """Return a share of the rotation of the camera of a scene, (3, 3)."""
-    right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
-    return rotation_from_vector(np.array([-down, right, 0.0]))
-
-
-def lamps_beside(scene: Scene, share: float) -> tuple[Lamp, ...]:
-    """Return the lamps beside the cone, seen by a rotated camera."""
-    if not scene.has_lamp:
-        return ()
-    camera = scene.camera
-    place = np.array(LAMP_PLACE) * camera.image_size
-    ray = np.append(camera.unproject(place), 1.0)
-    place = camera.project((camera_turn(scene, share) @ ray)[None])[0]
-    return (Lamp(place, (LAMP_RADIUS * camera.width,) * 2, level=LAMP_LEVEL),)
 
 
 def _stream(scene: Scene, *path: int) -> np.random.Generator:
@@ -353,11 +313,5 @@ def plan_in_motion(
     rotations, translations = moving_poses(
         rotation, translation, scene.tip_pen, turn, n_times
     )
-    view = View(
-        rotations,
-        translations,
-        led_gains(scene),
-        lamps=lamps_beside(scene, _share(scene, index)),
-        faces=led_faces(scene),
-    )
+    view = View(rotations, translations, led_gains(scene), faces=led_faces(scene))
     return ImagePlan(index, view, scene.optics, rotation, translation)

@@ -192,8 +192,6 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
             "faces": scene.faces,
             "halo": optics.halo,
             "ghost": optics.ghost,
-            "has_lamp": scene.has_lamp,
-            "camera_turn_px": scene.camera_turn,
             "radiance_cos_power": optics.cos_power,
             "peak_dn": optics.peak * optics.exposure * sensor.full_scale,
             "full_well_e": sensor.full_well,

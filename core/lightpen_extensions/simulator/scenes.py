@@ -78,12 +78,6 @@ def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
     return image
 
 
-def quantize(light: Light, sensor: Sensor) -> Image:
-    """Return the image without noise, as `expose`."""
-    charges = (light.levels + _background(light)) * np.float32(sensor.full_well)
-    return _digits(charges, sensor)
-
-
 def _background(light: Light) -> LightArray:
     height, width = light.levels.shape
     across, down = light.gradient
@@ -273,8 +267,6 @@ class Scene:
     camera: Camera = field(default_factory=paper_camera)
     tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)  # (3,), mm
     cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)  # (3,), mm
-    has_lamp: bool = False  # whether a lamp beside the cone is in view
-    camera_turn: float = 0.0  # px, by which images shift in all, or live in a minute
     viewpoint: int = 0  # index of the camera in the rig, from 0; it selects the noise
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lightpen_extensions.simulator.render import Light, Window
-from lightpen_extensions.simulator.scenes import Sensor, expose, quantize
+from lightpen_extensions.simulator.scenes import Sensor, expose
 
 SHAPE = (400, 500)
 WHOLE = Window(0, SHAPE[0], 0, SHAPE[1])
@@ -83,9 +83,3 @@ def test_background_adds_to_the_light_and_its_gradient_runs_across_the_image() -
     assert image[:, 0].mean() == pytest.approx(0.2 * 255, abs=0.5)
     assert image[:, -1].mean() == pytest.approx(0.4 * 255, abs=0.5)
     assert image[0].mean() - image[-1].mean() == pytest.approx(0.1 * 255, abs=0.5)
-
-
-def test_quantised_light_has_no_noise() -> None:
-    image = quantize(even_light(0.5), Sensor())
-    np.testing.assert_array_equal(image, 128)
-    assert quantize(even_light(0.5), Sensor(bits=12)).dtype == np.uint16
