@@ -1,10 +1,14 @@
 """Entering what a test wrote in the archive of its data folder."""
 
 from contextlib import closing
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 
+from msgspec import structs
+
 from lightpen.archive.logbook import Logbook
+from lightpen.record.library.library_changes import Author, change_item, known_item
 from lightpen.record.library.signing import (
     OwedFile,
     forget_owed,
@@ -12,6 +16,7 @@ from lightpen.record.library.signing import (
     owed_files,
     station_name,
 )
+from lightpen.record.library.tip_library import ItemKind, Library, read_library
 
 
 def enter_in(data: Path) -> None:
@@ -29,3 +34,18 @@ def put_in(data: Path, file: Path, content: bytes) -> None:
     owe(station_name(data), OwedFile(place, sha256(content).hexdigest()))
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
+
+
+def retire_item(
+    data: Path,
+    kind: ItemKind,
+    name: str,
+    by: Author,
+    now: datetime,
+    *,
+    is_retired: bool = True,
+) -> Library:
+    """Retire an item of the library, or bring it back; see `add_item`."""
+    item = known_item(read_library(data), kind, name)
+    retired = structs.replace(item, is_retired=is_retired)
+    return change_item(data, retired, by, now, before=item)

@@ -20,7 +20,7 @@ from msgspec import structs
 from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
 from tests.core.archive.test_station_events import keep
-from tests.entering import enter_in
+from tests.entering import enter_in, retire_item
 
 from lightpen.archive.chains import (
     ChainHead,
@@ -43,7 +43,7 @@ from lightpen.formats.own_json import CHECKSUM, with_checksum
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.library import entered_files
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.signing import (
     KEYS,
     STATION_FILE,

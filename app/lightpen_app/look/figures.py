@@ -1,16 +1,17 @@
 """What is drawn alike on the screen and on paper: budget, arrows, images."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.phrases import share_text
-from lightpen_app.look.theme import Colors
+from lightpen_app.look.theme import Colors, TextSize, font
+from lightpen_app.look.words import mm_text
 
 MANY = 400  # arrows; more are shown as their means
 N_CELLS = 20  # across; each shows the mean of its arrows
@@ -85,17 +86,6 @@ class BudgetFigure:
     limit: float | None = None
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """How a figure is drawn: its letters, colours and lines."""
-
-    font: QFont
-    bold: QFont
-    colors: Colors
-    line: float  # width
-    text: Callable[[float], str]  # of a length in mm
-
-
 def budget_figure(
     shares: Iterable[tuple[ContributionName, float, bool]],
     whole: float,
@@ -109,11 +99,12 @@ def budget_figure(
 
 
 def paint_budget(
-    painter: QPainter, area: QRectF, figure: BudgetFigure, drawing: Drawing
+    painter: QPainter, area: QRectF, figure: BudgetFigure, colors: Colors
 ) -> None:
     """Draw a bar for each source with its value; assumed ones are hollow."""
-    metrics, bold = QFontMetricsF(drawing.font), QFontMetricsF(drawing.bold)
-    colors, texts = drawing.colors, [_value_text(bar, drawing) for bar in figure.bars]
+    letters, strong = font(TextSize.SMALL), font(TextSize.SMALL, bold=True)
+    metrics, bold = QFontMetricsF(letters), QFontMetricsF(strong)
+    texts = list(map(_value_text, figure.bars))
     line, gap = metrics.height(), GAP * metrics.height()
     left = area.left() + gap + max(bold.horizontalAdvance(b.name) for b in figure.bars)
     right = area.right() - gap - max(map(bold.horizontalAdvance, texts))
@@ -126,12 +117,12 @@ def paint_budget(
         is_beyond = i == 0 and figure.limit is not None and bar.value > figure.limit
         color = QColor(colors.bad if is_beyond else colors.accent)
         thickness = min(THICKNESS * line, 0.8 * step)
-        length = max(scale * bar.value, drawing.line)
+        length = max(scale * bar.value, 1.0)
         place = QRectF(left, top + (step - thickness) / 2, length, thickness)
-        painter.setPen(QPen(color, drawing.line))
+        painter.setPen(QPen(color, 1.0))
         painter.setBrush(QColor(colors.panel) if bar.assumed else color)
         painter.drawRect(place)
-        painter.setFont(drawing.font if i else drawing.bold)
+        painter.setFont(letters if i else strong)
         painter.setPen(QColor(colors.text))
         name = QRectF(area.left(), top, left - gap - area.left(), step)
         painter.drawText(name, Qt.AlignmentFlag.AlignRight | MIDDLE, bar.name)
@@ -141,19 +132,19 @@ def paint_budget(
     if figure.limit is None:
         return
     x = left + scale * figure.limit
-    painter.setFont(drawing.font)
-    limit = translate("BudgetFigure", "limit {0}").format(drawing.text(figure.limit))
+    painter.setFont(letters)
+    limit = translate("BudgetFigure", "limit {0}").format(mm_text(figure.limit))
     width = metrics.horizontalAdvance(limit) + 1
     start = min(max(x - width / 2, area.left()), area.right() - width)
     painter.setPen(QColor(colors.muted))
     painter.drawText(QRectF(start, area.top(), width, line), MIDDLE, limit)
-    painter.setPen(QPen(QColor(colors.text), drawing.line, Qt.PenStyle.DashLine))
+    painter.setPen(QPen(QColor(colors.text), 1.0, Qt.PenStyle.DashLine))
     bottom = area.top() + head + len(figure.bars) * step
     painter.drawLine(QPointF(x, area.top() + head), QPointF(x, bottom))
 
 
-def _value_text(bar: BudgetBar, drawing: Drawing) -> str:
-    text = drawing.text(bar.value)
+def _value_text(bar: BudgetBar) -> str:
+    text = mm_text(bar.value)
     if not bar.assumed:
         return text
     return translate("BudgetFigure", "{0}, assumed").format(text)

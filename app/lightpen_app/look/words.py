@@ -122,11 +122,6 @@ def mm_text(value: float) -> str:
     return number_text(value, SHOWN_DECIMALS)
 
 
-def micrometres_text(value: float) -> str:
-    """Return a length in mm as micrometres, to the digit of `mm_text`."""
-    return number_text(MICROMETRES * value, 1)
-
-
 # Units that may be typed where one of the same kind stands: sizes in the first of them.
 KINDS_OF_UNIT = (
     {"mm": 1.0, "μm": 1e-3, "um": 1e-3, "cm": 10.0, "m": 1000.0, "in": 25.4, '"': 25.4},

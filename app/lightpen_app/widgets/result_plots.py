@@ -14,14 +14,12 @@ from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen_app.look.figures import (
     MANY,
     BudgetFigure,
-    Drawing,
     arrow_lines,
     arrow_scale,
     cell_means,
     paint_budget,
 )
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
-from lightpen_app.look.words import mm_text
 from lightpen_app.widgets.figure import Axes, Column, Figure
 from lightpen_app.widgets.plots import DASHES, LINE, SYMBOL, SYMBOLS, TONES, Curve, Plot
 
@@ -416,9 +414,7 @@ class BudgetPlot(Figure):
             painter.drawText(area, self._axes.title)
             area.setTop(area.top() + HEAD)
             if self._value.bars:
-                bold = font(TextSize.SMALL, bold=True)
-                drawing = Drawing(small, bold, colors, 1.0, mm_text)
-                paint_budget(painter, area, self._value, drawing)
+                paint_budget(painter, area, self._value, colors)
 
     @override
     def _restyle(self) -> None:

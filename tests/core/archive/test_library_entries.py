@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
+from tests.entering import retire_item
 
 from lightpen.archive.chains import Entry, Kind, entries_of
 from lightpen.archive.checks import check_archive
@@ -24,7 +25,6 @@ from lightpen.record.library.library_changes import (
     add_item,
     change_item,
     keep_picture,
-    retire_item,
 )
 from lightpen.record.library.tip_library import (
     ItemKind,

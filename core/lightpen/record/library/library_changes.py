@@ -104,21 +104,6 @@ def change_item(
             return _keep(data, number, item, by, now)
 
 
-def retire_item(
-    data: Path,
-    kind: ItemKind,
-    name: str,
-    by: Author,
-    now: datetime,
-    *,
-    is_retired: bool = True,
-) -> Library:
-    """Retire an item of the library, or bring it back; see `add_item`."""
-    item = known_item(read_library(data), kind, name)
-    retired = structs.replace(item, is_retired=is_retired)
-    return change_item(data, retired, by, now, before=item)
-
-
 def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
     """Return an item of a library, or raise `UsageError`."""
     found = library.item(kind, name)

@@ -14,9 +14,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 from tests.app.undressed import undressed
+from tests.entering import retire_item
 
 from lightpen.local_time import local_now
-from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (
     ItemKind,

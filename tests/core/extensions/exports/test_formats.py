@@ -15,6 +15,7 @@ import pytest
 import yaml
 from msgspec import structs
 from tests.aqdef import read_aqdef
+from tests.entering import retire_item
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import record_bytes
@@ -27,7 +28,7 @@ from lightpen.record.calibrations import (
     status_of,
     with_status,
 )
-from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange

@@ -4,10 +4,11 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 from msgspec import structs
+from tests.entering import retire_item
 
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.record.calibrations import certified_values, traced_items
-from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import (
     ItemKind,
     ListedCamera,

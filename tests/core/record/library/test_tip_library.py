@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from msgspec import structs
-from tests.entering import put_in
+from tests.entering import put_in, retire_item
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
 from lightpen.formats.decoding import encode_png
@@ -19,7 +19,6 @@ from lightpen.record.library.library_changes import (
     add_item,
     change_item,
     keep_picture,
-    retire_item,
 )
 from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from benchmarks.small_records import entries_of, small_record
 from msgspec import structs
-from tests.entering import enter_in
+from tests.entering import enter_in, retire_item
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import AcceptanceError, FileError
@@ -24,7 +24,7 @@ from lightpen.formats.own_json import StoredMessage
 from lightpen.messages import Code
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.names import Origin
-from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.signing import STATION_FILE
 from lightpen.record.library.supervision import Signature, set_limits, set_password
 from lightpen.record.library.tip_library import (
