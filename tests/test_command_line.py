@@ -591,7 +591,7 @@ def written_poses(rotations: FloatArray, translations: FloatArray, file: Path) -
         ),
         (
             lambda R, t: (R, t + (np.arange(len(t)) > 575)[:, None] * (R @ [0, 9, 0])),
-            "poses 1-576. Second tip: poses 577-1151",
+            "From pose 577 on the tip lies elsewhere in the pen",
         ),
     ],
 )

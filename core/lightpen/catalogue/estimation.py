@@ -41,6 +41,7 @@ MESSAGES = {
     "two-stage.too-few-poses": "{n_poses} poses are usable; the two-stage method starts from {needed}. Capture more images.",
     "pivot.covered": "the scatter of the poses and its correlation from pose to pose",
     "pivot.not-covered": "systematic errors common to all poses: the scale of the tracker and of the pen, a worn or badly seated tip",
+    "pivot.step": "From pose {pose} on the tip lies elsewhere in the pen ({tip:.2f} mm) or the pivot before the camera ({pivot:.2f} mm): the tip was replaced or slipped, or cone or tracker moved. Calibrate the poses before it and those from it on from files of their own.",
     "pivot.no-majority": "Only {n_used} of {n_poses} poses agree on one tip and pivot: the tip was replaced or slipped, or cone or tracker moved. The others are {others}. Calibrate each part from a file of its own.",
     "pivot.many-left-out": "{n_left_out} of {n_poses} poses are outliers and were excluded: {poses}. Check the tracking for disturbances, and whether tip, cone or tracker moved.",
     "poses.likely-inverted": "The tip is {tip:.0f} mm from the pen origin, farther than the pivot from the camera origin ({pivot:.0f} mm). This indicates inverted poses: for pen_from_cam, swap tip and pivot.",

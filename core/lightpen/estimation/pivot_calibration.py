@@ -14,6 +14,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import (
+    MIN_POSES,
     PivotFit,
     agreeing_solution,
     contact_matrix,
@@ -23,7 +24,7 @@ from lightpen.estimation.pivot.pivot import (
     tip_covariances,
 )
 from lightpen.messages import Message, message
-from lightpen.model.coverage import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR, EXACT, MIN_SPREAD, posture_spread
 
 # Detection of other conventions of poses: frames, order of numbers, units.
 #
@@ -285,6 +286,9 @@ def _spectra(n_kept: int, n_poses: int) -> FloatArray:
     return np.array(spectra)
 
 
+LEAST_PART = 0.1  # of the poses, before a step and after it
+SINGULAR = 1e-12  # of the trace; parts of too similar poses give any finite answer
+STEP = 60.0  # chi-square, 6 degrees of freedom: its place was chosen by residuals
 MANY_LEFT_OUT = 0.1  # of the poses
 MOST_LEFT_OUT = 0.4  # of the poses; with more the tip is ambiguous
 MAX_RUNS = 10  # of neighbouring poses, that a warning names; the record has all
@@ -341,11 +345,55 @@ def calibrate_pivot(
             n_poses=len(fit.used),
             others=_names(~fit.used, len(fit.used), places),
         )
+    if robust:
+        _require_no_step(rotations[fit.used], translations[fit.used], places[fit.used])
     return PivotCalibration(
         fit=fit,
         covariance=_covariance(rotations, covariances, fit),
         warnings=tuple(_warnings(fit, places)),
     )
+
+
+def _require_no_step(
+    rotations: FloatArray, translations: FloatArray, places: IntArray
+) -> None:
+    """Refuse poses whose tip or pivot is elsewhere from one of them on.
+
+    One fit to all leaves residuals that look like noise. They are parted where each
+    part by itself leaves the least, and the parts compared by what they then leave.
+    """
+    A, n_poses = contact_matrix(rotations), len(rotations)
+    b = translations.mean(axis=0) - translations
+    least = int(np.ceil(max(MIN_POSES, LEAST_PART * n_poses)))
+    if n_poses < 2 * least:
+        return
+    H = np.cumsum(np.einsum("nki,nkj->nij", A, A), axis=0)
+    g = np.cumsum(np.einsum("nki,nk->ni", A, b), axis=0)
+    ends = np.arange(least - 1, n_poses - least)
+    ridge = SINGULAR * np.trace(H[-1]) * np.eye(6)
+    explained = np.zeros(len(ends))
+    for sums, moments in ((H[ends], g[ends]), (H[-1] - H[ends], g[-1] - g[ends])):
+        solutions = np.linalg.solve(sums + ridge, moments[..., None])[..., 0]
+        explained += np.einsum("ni,ni->n", solutions, moments)
+    first = int(ends[np.argmax(explained)]) + 1
+    parts = rotations[:first], rotations[first:]
+    if min(posture_spread(each)[0][0] for each in parts) < MIN_SPREAD:
+        return
+    is_before = (np.arange(n_poses) < first)[:, None, None]
+    parted = np.where(is_before, A, 0.0), np.where(is_before, 0.0, A)
+    design = np.concatenate(parted, axis=2)
+    both = np.asarray(np.linalg.lstsq(design.reshape(-1, 12), b.ravel())[0])
+    between = np.hstack([-np.eye(6), np.eye(6)])
+    change = between @ both
+    covariance = correlated_covariance(design, design @ both - b)
+    likely = change @ np.linalg.solve(between @ covariance @ between.T, change)
+    if np.abs(change).max() > EXACT and likely > STEP:
+        raise CalibrationError(
+            "pivot.step",
+            pose=int(places[first]),
+            tip=float(np.linalg.norm(change[:3])),
+            pivot=float(np.linalg.norm(change[3:])),
+        )
 
 
 def _names(chosen: BoolArray, max_runs: int, places: IntArray) -> str:

@@ -5638,6 +5638,10 @@ needed</source>
         <translation>视频第 {number} 帧</translation>
     </message>
     <message>
+        <source>From pose {pose} on the tip lies elsewhere in the pen ({tip:.2f} mm) or the pivot before the camera ({pivot:.2f} mm): the tip was replaced or slipped, or cone or tracker moved. Calibrate the poses before it and those from it on from files of their own.</source>
+        <translation>从位姿 {pose} 起，测头在光笔中的位置改变 {tip:.2f} mm，或支点在相机前的位置改变 {pivot:.2f} mm：测头被更换或松动，或者锥孔或跟踪器移动过。请将此前和此后的位姿放在单独的文件中分别标定。</translation>
+    </message>
+    <message>
         <source>GenICam with a vendor&apos;s GenTL producer</source>
         <translation>GenICam，使用厂商的 GenTL 生产者</translation>
     </message>

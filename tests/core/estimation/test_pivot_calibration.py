@@ -175,3 +175,15 @@ def test_ten_runs_of_poses_are_named(n_runs: int, dots: str) -> None:
 
     runs = ", ".join(f"{start + 1}-{start + 3}" for start in starts[:10])
     assert warning.values["poses"] == runs + dots
+
+
+def test_a_tip_that_is_elsewhere_from_one_pose_on_is_refused_with_it() -> None:
+    R, t = poses()
+    t[120:] += R[120:] @ [0.0, -1.0, 0.0]
+    with pytest.raises(CalibrationError) as caught:
+        calibrate_pivot(R, t)
+
+    found = caught.value.message
+    assert found.code == "pivot.step"
+    assert abs(int(str(found.values["pose"])) - 121) <= 3
+    assert found.values["tip"] == pytest.approx(1.0, abs=0.6)
