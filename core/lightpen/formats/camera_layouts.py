@@ -25,7 +25,7 @@ from lightpen.model.fisheye import N_COEFFICIENTS
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
 LARGEST_ASPECT = 1.5  # of a pixel
-LARGEST_FOLD = 0.2  # of the image; one corner folds in many real files
+LARGEST_FOLD = 0.5  # of the image; corners that no view reached fold in many real files
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 
 

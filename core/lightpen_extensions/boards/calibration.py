@@ -29,7 +29,12 @@ from lightpen_extensions.boards.changes import (
     message_on_change,
     rotated_message,
 )
-from lightpen_extensions.boards.distortion import Choice, choose_distortion, fit_camera
+from lightpen_extensions.boards.distortion import (
+    STIFFNESSES,
+    Choice,
+    choose_distortion,
+    fit_camera,
+)
 from lightpen_extensions.boards.effects import MixedFit, fit_effects, rms_together
 from lightpen_extensions.boards.observing import (
     Views,
@@ -45,6 +50,7 @@ OFF_VIEW = 4.0  # times the median rms of the views
 FINEST = 1e-3  # px; exact points are off by rounding alone
 MOST_OFF = 0.2  # of the points
 WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
+FOLDED = 0.1  # of the image: high orders are then held nearer to 0
 UNCERTAIN = 0.005  # of the image's longer side, of projections over the image
 FARTHEST = np.tan(np.radians(84.0))  # in the normalised plane
 MIN_POINTS = 6  # of a view
@@ -148,11 +154,18 @@ def _calibrated(
     views: Views, near: BoardFit, report: Callable[[float], None]
 ) -> _Found:
     require_views(views)
-    fitted = fit_camera(views, near.state.cameras[0])
-    report(0.2)
-    choice, fitted = choose_distortion(views, fitted, report)
-    effects = fit_effects(views, fitted)
+    found: list[tuple[float, Choice, MixedFit]] = []
+    for stiffness in STIFFNESSES:
+        fitted = fit_camera(views, near.state.cameras[0], stiffness)
+        report(0.2)
+        choice, fitted = choose_distortion(views, fitted, report, stiffness)
+        effects = fit_effects(views, fitted)
+        share = effects.adjustment.state.cameras[0].folded_share
+        found.append((share, choice, effects))
+        if share <= FOLDED:
+            break
     report(0.9)
+    _, choice, effects = min(found, key=lambda each: each[0])
     fit = effects.adjustment
     return _Found(
         views, choice, effects, find_change(fit), tuple(_messages_on_lens(fit))

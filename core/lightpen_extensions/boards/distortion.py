@@ -31,8 +31,10 @@ from lightpen_extensions.boards.start import BoardPoses, start_board_poses, star
 
 FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
-# Standard deviations of what k3, and k4 k5 k6, do to the distance of a corner.
-OF_K3, OF_RATIONAL = 0.1, 1.0
+# Standard deviations of what k2, k3, and k4 k5 k6, do to the distance of a corner.
+OF_K2, OF_K3, OF_RATIONAL = 1.0, 0.1, 1.0
+# How much stiffer these priors become, of k2 and of the others, if the image folds.
+STIFFNESSES = ((0.0, 1.0), (0.0, 10.0), (0.0, 100.0), (3.0, 100.0), (30.0, 100.0))
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,12 @@ def choice_record(choice: Choice) -> dict[str, object]:
 
 
 def choose_distortion(
-    views: Views, fitted: BoardFit, report: Callable[[float], None]
+    views: Views,
+    fitted: BoardFit,
+    report: Callable[[float], None],
+    stiffness: tuple[float, float] = STIFFNESSES[0],
 ) -> tuple[Choice, BoardFit]:
-    """Return the lens model and its fit.
+    """Return the lens model and its fit; see `usual_distortion` for ``stiffness``.
 
     A model with another number than 5 coefficients must be better.
     """
@@ -85,7 +90,7 @@ def choose_distortion(
             if (n_first, n) == (FEW, MANY):
                 more = np.append(camera.distortion, np.zeros(n - n_first))
                 near = replace(camera, distortion=more)
-            trial = fit_camera(views, near)
+            trial = fit_camera(views, near, stiffness)
             if trial.state.cameras[0].folded_share > camera.folded_share:
                 continue
             trial_errors = held_out_errors(views, trial)
@@ -110,10 +115,13 @@ def is_wide(camera: Camera, pixels: FloatArray) -> bool:
     return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
 
 
-def usual_distortion(camera: Camera) -> FloatArray:
+def usual_distortion(
+    camera: Camera, stiffness: tuple[float, float] = STIFFNESSES[0]
+) -> FloatArray:
     """Return the information of intrinsics by what lenses usually do, (4 + n, 4 + n).
 
-    It is of the coefficients that fold the corners of an image, about 0.
+    It is of the coefficients that fold the corners of an image, about 0. ``stiffness``
+    is that of k2, and of those of higher order.
     """
     information = np.zeros((len(camera.intrinsics),) * 2)
     if camera.lens is LensModel.BROWN:
@@ -121,18 +129,22 @@ def usual_distortion(camera: Camera) -> FloatArray:
         information[8, 8] = (OF_K3 / corner**6) ** -2
         at = np.arange(9, len(information))
         information[at, at] = (OF_RATIONAL / corner ** (2 * at - 16.0)) ** -2
+        information *= stiffness[1] ** 2
+        information[5, 5] = (stiffness[0] * corner**4 / OF_K2) ** 2
     return information
 
 
-def fit_camera(views: Views, near: Camera) -> BoardFit:
-    """Fit camera, poses and board from an initial camera."""
+def fit_camera(
+    views: Views, near: Camera, stiffness: tuple[float, float] = STIFFNESSES[0]
+) -> BoardFit:
+    """Fit camera, poses and board from an initial camera; see `usual_distortion`."""
     poses = rough_poses(near, views)
     state = BoardState(
         (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
     straight = replace(near, distortion=np.zeros_like(near.distortion))
     origin = replace(state, cameras=(straight,))
-    return adjust_board(views, state, (usual_distortion(near),), origin)
+    return adjust_board(views, state, (usual_distortion(near, stiffness),), origin)
 
 
 def rough_poses(near: Camera, views: Views) -> BoardPoses:

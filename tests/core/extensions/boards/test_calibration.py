@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lightpen.errors import CalibrationError
+from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.model.camera import Camera
 from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.calibration import (
@@ -206,3 +207,23 @@ def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
     assert found.camera.covariance is not None
     assert np.isfinite(map_uncertainty(found.camera, found.camera.covariance).worst)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_lens_is_not_folded_where_no_view_is(
+    make_views: MakeViews, seed: int
+) -> None:
+    """The views reach a quarter of the way to the corners; what is beyond is open."""
+    lens = Camera(
+        *(640, 480, 357.0, 357.0, 325.0, 224.0),
+        distortion=np.array([-0.39, 0.15, -1e-4, -6e-4, -0.02]),
+    )
+    views = make_views(of=lens, n_views=12, seed=seed)
+    off = np.linalg.norm(views.pixels - [325.0, 224.0], axis=-1, keepdims=True)
+    inner = replace(views, pixels=np.where(off < 110.0, views.pixels, np.nan))
+    inner = inner.chosen(inner.seen.sum(axis=(1, 2)) >= 12)
+
+    found = calibrate_camera(inner)
+
+    assert found.camera.folded_share <= LARGEST_FOLD
+    assert "intrinsics.uncertain" in {remark.code for remark in found.remarks}
