@@ -15,7 +15,6 @@ from lightpen.estimation.uncertainty.disc_normals import (
     effect_of_normals,
 )
 from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
-from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR, N_DIRECTIONS, dial_counts, inverse
 from lightpen.model.limits import SwingLimits
@@ -245,6 +244,7 @@ MIN_IMAGES = 40
 MIN_LEDS = 5
 SECOND_PEN = 3  # lights that move together, besides the LEDs of the pen
 OTHER_SIZE = 0.1  # relative: discs that are another size than stated
+LARGEST_FOLD = 0.2  # of the image
 ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
 HALVES_APART = 6.0  # standard deviations of the difference
 HALVES_MISFIT = 3.0  # times the noise of either half alone
