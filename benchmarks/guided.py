@@ -22,7 +22,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import Posture, angles_between, rotations_of
 from lightpen.swing.capture.rules import advance_swing
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -105,7 +105,7 @@ def _swing(seed: int, kind: str) -> GuidedSwing:
     limits = SwingLimits(min_images=MAX_IMAGES, min_per_field=0, max_images=MAX_IMAGES)
     setup = SwingSetup(paper_camera(), paper_pen(), limits)
     clock = SkippingClock()
-    operator = Operator(clock, seed, seated=True)
+    operator = SimulatedOperator(clock, seed, seated=True)
     rng = np.random.default_rng([STREAM, seed])
     anywhere = _Wandering(setup, rng)
     state = replace(start_swing(setup), heading=0.0)
@@ -164,7 +164,7 @@ class _Wandering:
 
 
 def _sight(
-    setup: SwingSetup, operator: Operator, now: float, rng: np.random.Generator
+    setup: SwingSetup, operator: SimulatedOperator, now: float, rng: np.random.Generator
 ) -> PenDetection:
     """Return what the camera sees of the pen in the operator's hand."""
     held = operator.held(np.array([now]))

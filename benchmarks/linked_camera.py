@@ -18,7 +18,7 @@ from tests.gige_simulator import GigeSimulator
 from lightpen.arrays import Image
 from lightpen.cameras.pairing import SkippingClock
 from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 N_RENDERED = 24  # a second of a swing, shown forward and backward
 SEATING = 6.0  # s until the pen is in its cone
@@ -27,7 +27,9 @@ SEATING = 6.0  # s until the pen is in its cone
 def main() -> None:
     """Render, and serve until killed."""
     clock = SkippingClock()
-    camera = SimulatedCamera(clock=clock, operator=Operator(clock, seated=True))
+    camera = SimulatedCamera(
+        clock=clock, operator=SimulatedOperator(clock, seated=True)
+    )
     camera.operator.swing()
     clock.wait(SEATING)
     camera.open()

@@ -74,7 +74,11 @@ from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
 from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
-from lightpen_extensions.simulator.hand import Operator, lean_vectors, postures_of
+from lightpen_extensions.simulator.hand import (
+    SimulatedOperator,
+    lean_vectors,
+    postures_of,
+)
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
@@ -496,7 +500,7 @@ def _earlier_calibration(n: int) -> Event:
 def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
     """Return a swing in the middle of its capture."""
     clock = SkippingClock()
-    operator = Operator(clock, scene.seed, seated=True)
+    operator = SimulatedOperator(clock, scene.seed, seated=True)
     follower = GuidedOperator(operator)
     rng = np.random.default_rng(scene.seed)
     state = start_swing(setup)

@@ -32,7 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication
 import lightpen_extensions.simulator.camera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen.cameras.protocol import CameraSettings
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen.record.swings.interrupted import (find_unfinished,)
@@ -91,7 +91,8 @@ def swing(folder):
 
     run.happened.connect(say)
     clock = around.clock
-    camera = SimulatedCamera(simulator.scene, clock, Operator(clock, seated=True))
+    operator = SimulatedOperator(clock, seated=True)
+    camera = SimulatedCamera(simulator.scene, clock, operator)
     workbench.live.open([camera], CameraSettings(), clock)
     workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted

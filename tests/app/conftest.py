@@ -61,7 +61,7 @@ from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.work.job import Report, collect_if_due
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import paper_camera
@@ -446,10 +446,10 @@ class Walker:
     # Takes the simulated pen
 
     @property
-    def operator(self) -> Operator:
+    def operator(self) -> SimulatedOperator:
         """Who holds the simulated pen."""
         operator = self.workbench.live.operator
-        assert isinstance(operator, Operator)
+        assert isinstance(operator, SimulatedOperator)
         return operator
 
     def swing(self) -> None:

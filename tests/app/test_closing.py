@@ -28,7 +28,7 @@ from lightpen_app.application import END_SIGNALS, EndSignals
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -149,7 +149,7 @@ def swing_before(workbench: Workbench, stuck: Stuck) -> None:
     """Swing before a camera that will not close."""
     around = workbench.around
     camera = StuckCamera(
-        scene_of(around), around.clock, Operator(around.clock, seated=True)
+        scene_of(around), around.clock, SimulatedOperator(around.clock, seated=True)
     )
     camera.stuck = stuck
     workbench.live.open([camera], CameraSettings(), around.clock)
@@ -239,7 +239,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
 ) -> None:
     around, append = workbench.around, RecordWriter.append
     camera = SimulatedCamera(
-        scene_of(around), around.clock, Operator(around.clock, seated=True)
+        scene_of(around), around.clock, SimulatedOperator(around.clock, seated=True)
     )
     workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)

@@ -11,7 +11,7 @@ from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.work.settings import Settings, Station, StoredCamera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -56,7 +56,7 @@ def swing_and_accept(walker: "Walker") -> None:
     walker.until_shows("Swing")
     walker.until(lambda: run.status.state is not None and run.status.result is None)
     operator = live.operator
-    assert isinstance(operator, Operator)
+    assert isinstance(operator, SimulatedOperator)
     operator.seat()
     live.set_following(True)
     walker.until(lambda: run.status.verdict is not None)

@@ -29,7 +29,7 @@ from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.swing_recorder import read_resumable
 from lightpen_extensions.simulator.camera import GuidedOperator
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
@@ -101,7 +101,7 @@ class Station:
     runner: SwingRunner
     witness: Witness
     clock: SkippingClock
-    operator: Operator
+    operator: SimulatedOperator
     camera: FaultyCamera
     _last: PenDetection | None = None
     _first: SwingStatus = field(init=False)
@@ -264,7 +264,7 @@ def prepared_by_two(
 @pytest.fixture
 def station(tmp_path: Path, prepared: Preparation) -> Iterator[Station]:
     witness, clock = Witness(), SkippingClock()
-    operator = Operator(clock, seated=True)
+    operator = SimulatedOperator(clock, seated=True)
     witness.follower = GuidedOperator(operator)
     assert prepared.camera is not None
     camera = FaultyCamera(Scene(camera=prepared.camera), clock, operator)

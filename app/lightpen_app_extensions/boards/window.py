@@ -40,7 +40,7 @@ from lightpen_app_extensions.boards.view import (
 from lightpen_extensions.boards.boards import Board
 from lightpen_extensions.boards.calibration import MIN_VIEWS, CameraCalibration
 from lightpen_extensions.boards.simulated_boards import HeldBoard
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 SIDE_WIDTH = 48 * GRID
 LEAST_LIST = 28 * GRID  # px, of the views
@@ -181,7 +181,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _hold_simulated(self, board: Board | None) -> None:
         """Let a simulated operator hold the board in view, or the pen again."""
         operator = self._live.operator
-        if isinstance(operator, Operator):
+        if isinstance(operator, SimulatedOperator):
             operator.in_view = None if board is None else HeldBoard(board)
 
     def _named_board(self) -> Board | None:

@@ -42,7 +42,7 @@ from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.registry import ALL_TASKS, task_of
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_extensions.measure.workflow import VerificationRunner
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 KEY = "measure"
 LONGEST = 16  # characters of a name
@@ -141,7 +141,7 @@ class MeasureService(Service):
             is_led = touches and run.runner.status.is_here
             run.probing_operator = (
                 ProbingOperator(operator)
-                if is_led and isinstance(operator, Operator)
+                if is_led and isinstance(operator, SimulatedOperator)
                 else None
             )
 

@@ -63,11 +63,12 @@ MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 Table = TypeVar("Table", bound=tuple[Any, ...])  # of arrays (N, ...), or other tables
 
 
-def rows_of(table: Table, rows: BoolArray | IntArray | list[int]) -> Table:
+def chosen_rows(table: Table, rows: BoolArray | IntArray | list[int]) -> Table:
     """Return some rows of all arrays of a named tuple."""
     make: Any = type(table)
     chosen = (
-        rows_of(each, rows) if isinstance(each, tuple) else each[rows] for each in table
+        chosen_rows(each, rows) if isinstance(each, tuple) else each[rows]
+        for each in table
     )
     made: Table = make(*chosen)
     return made
@@ -189,7 +190,7 @@ def with_rims(image: Image, discs: Discs, before: Starts | None = None) -> Discs
     unclear = np.flatnonzero(np.isfinite(discs.rims.centers[:, 0]))
     if not len(unclear):
         return discs
-    starts = rows_of(discs.rims, unclear)
+    starts = chosen_rows(discs.rims, unclear)
     if before is not None:
         starts = _nearest(starts, before())
     fits = fit_edges(image, starts)
@@ -198,7 +199,7 @@ def with_rims(image: Image, discs: Discs, before: Starts | None = None) -> Discs
     good = fits.are_whole & (GAUSSIAN_RISE * fits.sigmas < SHARPER * wide)
     by_rim = unclear[good]
     moments, are_whole = np.stack(discs.moments), discs.are_whole.copy()
-    moments[:, by_rim] = moments_of_rims(rows_of(fits, good))
+    moments[:, by_rim] = moments_of_rims(chosen_rows(fits, good))
     are_whole[by_rim] = True
     return discs._replace(moments=DiscMoments(*moments), are_whole=are_whole)
 
@@ -208,7 +209,7 @@ def _nearest(starts: EdgeStarts, before: EdgeStarts) -> EdgeStarts:
     if not len(before.centers):
         return starts
     gaps = np.linalg.norm(starts.centers[:, None] - before.centers, axis=2)
-    near = rows_of(before, gaps.argmin(axis=1))
+    near = chosen_rows(before, gaps.argmin(axis=1))
     reach = 2 * np.sqrt(near.shapes[:, 0, 0] + near.shapes[:, 1, 1])
     known = gaps.min(axis=1) <= reach
     return EdgeStarts(

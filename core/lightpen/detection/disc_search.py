@@ -20,8 +20,8 @@ from lightpen.detection.disc_moments import (
     NO_DISCS,
     Discs,
     Starts,
+    chosen_rows,
     joined,
-    rows_of,
     with_rims,
 )
 from lightpen.detection.disc_stack import measure_discs
@@ -149,7 +149,7 @@ def find_discs(
     measured = with_rims(scene.image, measured, before)
     if len(measured.boxes) == len(boxes) and measured.are_whole.all() and not hidden:
         return measured
-    discs = [rows_of(measured, measured.are_whole)]
+    discs = [chosen_rows(measured, measured.are_whole)]
     for box in hidden:
         discs += _parted(scene, box, level, None, budget)
     for region in _each(measured, ~measured.are_whole):
@@ -159,7 +159,7 @@ def find_discs(
 
 def _each(discs: Discs, chosen: BoolArray) -> list[Discs]:
     """Return some discs, each by itself."""
-    return [rows_of(discs, [i]) for i in np.flatnonzero(chosen).tolist()]
+    return [chosen_rows(discs, [i]) for i in np.flatnonzero(chosen).tolist()]
 
 
 def _box(disc: Discs) -> PixelBox:
@@ -208,7 +208,7 @@ def _unique(discs: Discs) -> Discs:
     for i in np.argsort(-discs.moments.area, kind="stable").tolist():
         if not any(boxes[larger].holds_center_of(boxes[i]) for larger in kept):
             kept.append(i)
-    return rows_of(discs, kept)
+    return chosen_rows(discs, kept)
 
 
 def _regions(scene: Survey, box: PixelBox, level: float) -> list[PixelBox]:
@@ -270,7 +270,7 @@ def _measured(
         # Less contrast is the texture of something bright.
         heights = discs.levels.plateau - scene.background
         are_discs = discs.levels.contrast > MIN_RELATIVE_CONTRAST * heights
-        found.append(discs if are_discs.all() else rows_of(discs, are_discs))
+        found.append(discs if are_discs.all() else chosen_rows(discs, are_discs))
         clear = set(at[are_discs].tolist())
         hidden += [
             box

@@ -16,10 +16,10 @@ from lightpen.detection.disc_moments import (
     Discs,
     Levels,
     assessed,
+    chosen_rows,
     joined,
     moments_by_sums,
     rim_start,
-    rows_of,
 )
 from lightpen.detection.edge_fit import EdgeStarts
 from lightpen.detection.pixel_box import PixelBox, Reals, stacked
@@ -41,7 +41,7 @@ SHARES = np.arange(8) / 8  # of a side: a hole of a ring is wider
 SAMPLES = 16  # per side of a window, to find background and plateau
 
 
-class Measured(NamedTuple):
+class DiscsOfBoxes(NamedTuple):
     """Discs in boxes."""
 
     discs: Discs
@@ -55,7 +55,7 @@ def measure_discs(
     level: float,
     noise: float,
     floor: float = 0.0,
-) -> Measured:
+) -> DiscsOfBoxes:
     """Return the discs in boxes where something is large and bright enough.
 
     Parameters
@@ -83,19 +83,19 @@ def measure_discs(
             regions = found.discs.boxes[wide]
             again = _measured(image, regions, 4, level, noise, floor)
             others = [other for other in found.others if other[0] in whole]
-            kept = Measured(rows_of(found.discs, ~wide), whole, others)
+            kept = DiscsOfBoxes(chosen_rows(found.discs, ~wide), whole, others)
             found = _joined([kept, _of_boxes(again, left)])
         parts.append(_of_boxes(found, stack))
     return _joined(parts)
 
 
-def _of_boxes(found: Measured, boxes: IntArray) -> Measured:
+def _of_boxes(found: DiscsOfBoxes, boxes: IntArray) -> DiscsOfBoxes:
     """Return discs in some of more boxes."""
     others = [(int(boxes[i]), other) for i, other in found.others]
-    return Measured(found.discs, boxes[found.box], others)
+    return DiscsOfBoxes(found.discs, boxes[found.box], others)
 
 
-def _joined(parts: Sequence[Measured]) -> Measured:
+def _joined(parts: Sequence[DiscsOfBoxes]) -> DiscsOfBoxes:
     if len(parts) == 1:
         return parts[0]
     others = [other for part in parts for other in part.others]
@@ -103,7 +103,7 @@ def _joined(parts: Sequence[Measured]) -> Measured:
         joined([part.discs for part in parts]),
         np.concatenate([part.box for part in parts]),
     )
-    return Measured(discs, box, others)
+    return DiscsOfBoxes(discs, box, others)
 
 
 def _alike(boxes: IntArray) -> Iterator[IntArray]:
@@ -118,7 +118,7 @@ def _alike(boxes: IntArray) -> Iterator[IntArray]:
 
 def _measured(
     image: Image, boxes: IntArray, margin: int, level: float, noise: float, floor: float
-) -> Measured:
+) -> DiscsOfBoxes:
     """Measure the discs in boxes grown by a share of their size, one over a number."""
     sizes = np.maximum(*_sides(boxes))
     height, width = image.shape
@@ -182,9 +182,9 @@ def _measured(
     )
     box = np.flatnonzero(are_enough)
     if len(box) < len(boxes):
-        discs = rows_of(discs, box)
+        discs = chosen_rows(discs, box)
         others = [other for other in others if are_enough[other[0]]]
-    return Measured(discs, box, others)
+    return DiscsOfBoxes(discs, box, others)
 
 
 def _ramp(levels: Levels, noise: float, floor: float) -> tuple[FloatArray, FloatArray]:

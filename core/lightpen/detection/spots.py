@@ -18,8 +18,8 @@ from lightpen.detection.disc_moments import (
     MIN_SIZE,
     Discs,
     Starts,
+    chosen_rows,
     ellipse_misfits,
-    rows_of,
 )
 from lightpen.detection.disc_search import (
     LEVEL_OF_PEAK,
@@ -233,7 +233,7 @@ def _spots_of(
             scene, discs = flat, flat_discs
         has_smears = not len(discs.boxes) and _has_smears(flat)
     order = np.argsort(-discs.levels.contrast, kind="stable")
-    discs = rows_of(discs, order[:MAX_SPOTS])
+    discs = chosen_rows(discs, order[:MAX_SPOTS])
     spots = _as_spots(discs, full_scale, scene.noise, has_smears)
     usual_area = median(spots.areas.tolist()) if len(spots) else 0.0
     if len(spots) < MIN_POSE_LEDS or usual_area < HARDLY_AREA:

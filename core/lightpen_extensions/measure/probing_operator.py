@@ -12,7 +12,7 @@ from lightpen_extensions.measure.probing.probing import ProbingPhase
 from lightpen_extensions.measure.session import SessionSetup, SessionState, is_at_rest
 from lightpen_extensions.measure.tasks.registry import AnyTask
 from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
-from lightpen_extensions.simulator.hand import HandActivity, Operator
+from lightpen_extensions.simulator.hand import HandActivity, SimulatedOperator
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class _TouchGoal:
 class ProbingOperator:
     """Moves the hand of a simulated operator by the states of a verification."""
 
-    def __init__(self, operator: Operator) -> None:
+    def __init__(self, operator: SimulatedOperator) -> None:
         self._operator = operator
         self._wanted: _TouchGoal | None = None
 

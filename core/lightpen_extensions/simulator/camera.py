@@ -26,7 +26,7 @@ from lightpen.cameras.protocol import (
 from lightpen.messages import SWING_TO_SEAT
 from lightpen.model.rigid import FIRST_LEAN, UPRIGHT, Posture, Rig
 from lightpen.swing.capture.state import Phase, SwingState
-from lightpen_extensions.simulator.hand import HandPose, Operator
+from lightpen_extensions.simulator.hand import HandPose, SimulatedOperator
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
     led_faces,
@@ -47,7 +47,7 @@ class GuidedOperator:
     The heading is the operator's right as the camera sees it, rad.
     """
 
-    def __init__(self, operator: Operator, heading: float = 0.0) -> None:
+    def __init__(self, operator: SimulatedOperator, heading: float = 0.0) -> None:
         self._operator = operator
         self._heading = heading
         self._wish: Posture | None = None
@@ -104,7 +104,7 @@ class SimulatedCamera:
     scene : Scene, optional
         Pen, camera, tip, cone, optics and sensor; its swing and its disturbances are
         left out.
-    operator : Operator, optional
+    operator : SimulatedOperator, optional
         Must use the same clock.
     rig : Rig, optional
         The camera is the second of it, and the scene before the first.
@@ -116,7 +116,7 @@ class SimulatedCamera:
         self,
         scene: Scene | None = None,
         clock: Clock | None = None,
-        operator: Operator | None = None,
+        operator: SimulatedOperator | None = None,
         *,
         lamps: tuple[Lamp, ...] = (),
         serial: str = SERIAL,
@@ -129,7 +129,7 @@ class SimulatedCamera:
             self.scene = replace(self.scene, camera=rig.cameras[1], viewpoint=1)
         self._clock = clock or MachineClock()
         n_leds = self.scene.pen.n_leds
-        self.operator = operator or Operator(
+        self.operator = operator or SimulatedOperator(
             self._clock, self.scene.seed, n_leds=n_leds
         )
         self._lamps = lamps

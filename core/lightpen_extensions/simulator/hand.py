@@ -188,7 +188,7 @@ class _Wish(NamedTuple):
     moves: bool  # the pen, not the hand before it
 
 
-class Operator:
+class SimulatedOperator:
     """A simulated operator who holds a pen of ``n_leds`` LEDs.
 
     The commands may come from any thread. They take effect at the present time of the

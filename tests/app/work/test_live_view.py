@@ -31,7 +31,7 @@ from lightpen_app.work.job import Notifications
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app_extensions.measure.service import VerificationRun
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.stream.server import PoseStream
 
 TIMEOUT = 60.0  # s until a test gives up
@@ -94,7 +94,7 @@ class Stage:
 
     def camera(self) -> FaultyCamera:
         clock = self.around.clock
-        operator = Operator(clock, seated=True)
+        operator = SimulatedOperator(clock, seated=True)
         return FaultyCamera(scene_of(self.around), clock, operator)
 
     def hold_up(self, n_images: int) -> None:

@@ -18,7 +18,7 @@ from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_extensions.simulator.camera import GuidedOperator
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 TIMEOUT = 60.0  # s until a test gives up
 SIGNALS = ("changed", "happened", "progressed", "refused")
@@ -170,7 +170,7 @@ def test_a_follower_sees_every_state_though_the_gui_is_busy(
         def follow(self, state: SwingState) -> None:
             self.seen.append(state)
 
-    watcher = Watcher(Operator(SkippingClock()))
+    watcher = Watcher(SimulatedOperator(SkippingClock()))
     watcher.seen = []
     run.follower = watcher
     run.runner.ask(lambda workflow: workflow.begin(prepared))

@@ -40,7 +40,7 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import CameraWorker, is_too_slow
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 
 SCENE = Scene(camera=Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43))
@@ -95,7 +95,7 @@ class SpiedCamera(FaultyCamera):
     """Notes who calls it, and when it is opened."""
 
     def __init__(self, clock: Clock) -> None:
-        super().__init__(SCENE, clock, Operator(clock, seated=True))
+        super().__init__(SCENE, clock, SimulatedOperator(clock, seated=True))
         self.clock = clock
         self.threads: set[int] = set()
         self.opened_at: list[float] = []

@@ -21,7 +21,7 @@ from lightpen.pen_check.match import (
     add_view,
     match_pen,
 )
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -65,7 +65,7 @@ def images(
     """Yield what 20 images a second show of a pen that is swung, or held still."""
     rng = np.random.default_rng(seed)
     clock = SkippingClock()
-    operator = Operator(clock, seed, seated=True)
+    operator = SimulatedOperator(clock, seed, seated=True)
     if swings:
         operator.swing()
     clock.wait(1.0)

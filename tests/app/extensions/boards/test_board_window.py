@@ -36,7 +36,7 @@ from lightpen_extensions.boards.simulated_boards import (
     render_board,
     simulate_board_poses,
 )
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Sensor
 
 if TYPE_CHECKING:
@@ -399,7 +399,7 @@ def test_a_simulated_operator_holds_the_board_while_views_are_captured(
     workbench.camera.open()
     qtbot.waitUntil(lambda: workbench.live.operator is not None)
     operator = workbench.live.operator
-    assert isinstance(operator, Operator)
+    assert isinstance(operator, SimulatedOperator)
     press(window, "Start")
     assert isinstance(operator.in_view, HeldBoard)
     assert operator.in_view.board == parse_board(BOARD)

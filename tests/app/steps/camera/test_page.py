@@ -50,7 +50,7 @@ from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.hand import HandActivity, Operator
+from lightpen_extensions.simulator.hand import HandActivity, SimulatedOperator
 from lightpen_extensions.simulator.scene_files import write_scene
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.view import Lamp
@@ -863,7 +863,7 @@ def test_without_a_pen_file_the_operator_is_asked_whether_it_is_covered(
     seen.page.entered()
     seen.wait("Bright spots: 10")
     operator = workbench.live.operator
-    assert isinstance(operator, Operator)
+    assert isinstance(operator, SimulatedOperator)
     seen.until(lambda: operator.doing is HandActivity.SEATED)
 
     seen.click("Search")

@@ -34,7 +34,7 @@ from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.plots import TracePlot
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 
 if TYPE_CHECKING:
     from tests.app.conftest import SolvingOn
@@ -84,8 +84,8 @@ class Desk:
         return self.run.status.state
 
     @property
-    def operator(self) -> Operator:
-        assert isinstance(self.workbench.live.operator, Operator)
+    def operator(self) -> SimulatedOperator:
+        assert isinstance(self.workbench.live.operator, SimulatedOperator)
         return self.workbench.live.operator
 
     @property

@@ -14,7 +14,7 @@ from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.simulated_boards import HELD_IMAGES, HELD_S, HeldBoard
 from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen_extensions.simulator.view import Lamp
@@ -35,7 +35,7 @@ def seated_camera(
     lamps: tuple[Lamp, ...] = (),
 ) -> FaultyCamera:
     clock = clock or SkippingClock()
-    operator = Operator(clock, scene.seed, seated=True)
+    operator = SimulatedOperator(clock, scene.seed, seated=True)
     camera = FaultyCamera(scene, clock, operator, lamps=lamps)
     camera.open()
     return camera

@@ -11,13 +11,13 @@ from lightpen.messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 from lightpen.model.rigid import FIRST_LEAN, UPRIGHT, Posture
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
 from lightpen_extensions.simulator.camera import GENTLE_LEANS, GuidedOperator
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 ASKED = Posture(tilt=0.3, direction=2.0, turn=0.1)
 
 
-class ToldOperator(Operator):
+class ToldOperator(SimulatedOperator):
     """Notes what is requested."""
 
     def __init__(self) -> None:

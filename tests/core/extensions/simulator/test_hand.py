@@ -12,7 +12,7 @@ from lightpen_extensions.simulator.hand import (
     REACTION,
     HandActivity,
     HandPose,
-    Operator,
+    SimulatedOperator,
 )
 from lightpen_extensions.simulator.swings import (
     MAX_TILT,
@@ -35,7 +35,7 @@ class Scene:
 
     def __init__(self, seed: int = 1, *, seated: bool = True) -> None:
         self.clock = SkippingClock()
-        self.operator = Operator(self.clock, seed, seated=seated)
+        self.operator = SimulatedOperator(self.clock, seed, seated=seated)
 
     @property
     def now(self) -> float:
@@ -70,7 +70,9 @@ def offsets(seen: list[HandPose]) -> FloatArray:
     return np.concatenate([held.offsets for held in seen])
 
 
-def seen_after(act: Callable[[Operator], None], seconds: float = 2.0) -> list[HandPose]:
+def seen_after(
+    act: Callable[[SimulatedOperator], None], seconds: float = 2.0
+) -> list[HandPose]:
     scene = Scene()
     scene.watch(1)
     act(scene.operator)

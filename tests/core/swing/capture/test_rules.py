@@ -46,7 +46,7 @@ from lightpen.swing.capture.state import (
     Transition,
     start_swing,
 )
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -78,7 +78,7 @@ class Station:
     ) -> None:
         self.clock = SkippingClock()
         self.period = period
-        self.operator = Operator(self.clock, seed)
+        self.operator = SimulatedOperator(self.clock, seed)
         self.rng = np.random.default_rng([seed, 1])
         self.sigma = sigma
         self.setup = SwingSetup(
