@@ -283,9 +283,15 @@ class Preparation:
         return replace(self, names=names, nominal_tip=nominal_tip)
 
     def with_listed(self, tip: ListedTip) -> Self:
-        """Return a copy for a tip of the library, with its ball and nominal centre."""
-        names = replace(self.names, tip=tip.id, ball_diameter=tip.ball_diameter_mm)
-        return replace(self, names=names, nominal_tip=tip.nominal_tip)
+        """Return a copy for a tip of the library, with its ball and nominal centre.
+
+        What the library does not tell stays if it is the tip that is in use.
+        """
+        now = self.renamed(replace(self.names, tip=tip.id))
+        ball = tip.ball_diameter_mm or now.names.ball_diameter
+        nominal_tip = now.nominal_tip if tip.nominal_tip is None else tip.nominal_tip
+        names = replace(now.names, ball_diameter=ball)
+        return replace(now, names=names, nominal_tip=nominal_tip)
 
     @property
     def region(self) -> RegionOfInterest:

@@ -508,6 +508,29 @@ def test_a_barcode_chooses_its_tip_wherever_the_focus_is(
     assert field.hasFocus()
 
 
+def test_a_tip_that_is_scanned_again_keeps_what_the_library_does_not_tell(
+    desk: Desk,
+) -> None:
+    desk.add(ListedTip(id="T-8"))
+    desk.scan("T-8")
+    desk.enter("Ball diameter", "4.5")
+    QTest.keyClick(desk.control("Ball diameter"), Qt.Key.Key_Return)
+    desk.scan("T-8", at=200_000)
+
+    assert desk.workbench.selection.preparation.names.ball_diameter == 4.5
+
+    desk.names.list_of(ItemKind.TIP).menu().actions()[0].trigger()
+
+    assert desk.workbench.selection.preparation.names.ball_diameter == 4.5
+    assert desk.text_of("Ball diameter") == "4.5000 mm"
+
+    desk.add(TIP)
+    desk.scan("T-7", at=300_000)
+    desk.scan("T-8", at=400_000)
+
+    assert desk.workbench.selection.preparation.names.ball_diameter is None
+
+
 def test_what_a_hand_types_stays_in_its_field(desk: Desk) -> None:
     desk.add(TIP)
     field = desk.control("Operator")
