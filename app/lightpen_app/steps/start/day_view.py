@@ -28,7 +28,7 @@ from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.start.day_state import TipRow
 from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
 from lightpen_app.widgets.fields import ChoiceField, Translated
-from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage, message_icon
 from lightpen_app.widgets.tables import RIGHT, RowTable
 
@@ -183,6 +183,7 @@ class DayView(Translated, QWidget):
         )
         self._answer = self.make_button(self.tr("Confirm"), self._on_answered)
         self._asking = QWidget()
+        self._asking.hide()  # as it appears, it offers the last temperature
         self._question.setBuddy(self._temperature)
         self._search = self.say(
             SearchEdit(), self.tr("Search tips"), hint=self.tr("Scan or type a tip")
@@ -332,7 +333,8 @@ class DayView(Translated, QWidget):
             self._temperature.selectAll()
 
     def _on_answered(self) -> None:
-        self.temperature_entered.emit(self._temperature.temperature())
+        if not is_refusing(self._asking):
+            self.temperature_entered.emit(self._temperature.temperature())
 
     def _on_row_changed(self, now: QModelIndex) -> None:
         if now.isValid() and now.row() < len(self._shown):

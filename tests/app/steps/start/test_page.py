@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
+from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
 
 from lightpen.estimation.reports.verdict import Grade
@@ -1186,6 +1187,31 @@ def test_every_label_leads_to_its_field(start: Opened) -> None:
 
 
 # What is reported as long as it holds
+
+
+def test_a_station_without_a_temperature_is_offered_none_and_no_slip_confirms_one(
+    qtbot: QtBot,
+) -> None:
+    view, answers = DayView(), list[float | None]()
+    qtbot.addWidget(view)
+    view.temperature_entered.connect(answers.append)
+    view.set_question(None, is_asked=True)
+    view.show()
+    (field,) = view.findChildren(TemperatureField)
+    (confirm,) = (b for b in view.findChildren(QPushButton) if b.text() == "Confirm")
+
+    assert field.text() == ""
+    confirm.click()
+    assert answers == [None]
+
+    type_number(field, "2l")
+    confirm.click()
+    assert field.text() == "2l"
+    assert field.reason()
+    assert answers == [None]
+
+    type_number(field, "21")
+    assert answers == [None, 21.0]
 
 
 def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
