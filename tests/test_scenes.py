@@ -137,19 +137,6 @@ def test_useless_images_of_a_hard_scene_are_dropped_with_their_reason(
         assert re.search(words[flag], reason, re.IGNORECASE), (flag, reason)
 
 
-def test_good_images_of_a_hard_scene_are_used(
-    hard: Path, record: Record, truth: Truth
-) -> None:
-    flags = {
-        frame["file"]: answer["flags"]
-        for frame, answer in zip(
-            record(hard)["frames"], truth(hard)["frames"], strict=True
-        )
-        if not frame["used"] and set(answer["flags"]) <= {"clutter", "dim"}
-    }
-    assert not flags
-
-
 def test_good_images_of_a_hard_scene_are_used_with_their_leds(
     hard: Path, record: Record, truth: Truth
 ) -> None:

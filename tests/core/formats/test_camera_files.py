@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import random
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -803,44 +802,6 @@ XML = """<?xml version="1.0"?>
 
 def test_sequences_in_xml_are_read(tmp_path: Path) -> None:
     assert_same(read_camera(saved(tmp_path, XML)), camera())
-
-
-@pytest.mark.parametrize(
-    "text",
-    [OPENCV, ROS, KALIBR, json.dumps(MATLAB), XML],
-    ids=["OpenCV", "ROS", "Kalibr", "MATLAB", "XML"],
-)
-def test_damaged_files_are_read_or_refused(tmp_path: Path, text: str) -> None:
-    chance = random.Random(7)
-    path = tmp_path / "cam.yaml"
-    for _ in range(150):
-        data = bytearray(text.encode())
-        for _ in range(chance.randrange(1, 8)):
-            place = chance.randrange(len(data))
-            match chance.randrange(3):
-                case 0:
-                    data[place] = chance.randrange(256)
-                case 1:
-                    del data[place : place + chance.randrange(1, 20)]
-                case _:
-                    data[place:place] = chance.choice(
-                        [
-                            b"[",
-                            b"{",
-                            b'"',
-                            b"9" * 400,
-                            b"e999",
-                            b"&a ",
-                            b"!!",
-                            b"<",
-                            b":",
-                        ]
-                    )
-        path.write_bytes(data)
-        with contextlib.suppress(LightpenError):
-            found = read_camera(path)
-            assert np.all(np.isfinite(found.intrinsics))
-            assert len(found.distortion) in (5, 8)
 
 
 def test_the_shared_camera_is_read(shared_data: Path) -> None:

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import random
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -498,26 +497,6 @@ def test_any_content_is_read_or_refused(
     path.write_bytes(data)
     with contextlib.suppress(LightpenError):
         read_pen(path, units="mm")
-
-
-@pytest.mark.parametrize("text", [table(), document(diameter=8)], ids=["CSV", "JSON"])
-def test_damaged_files_are_read_or_refused(tmp_path: Path, text: str) -> None:
-    chance = random.Random(3)
-    path = tmp_path / "leds.csv"
-    for _ in range(300):
-        data = bytearray(text.encode())
-        for _ in range(chance.randrange(1, 6)):
-            place = chance.randrange(len(data))
-            if chance.random() < 0.5:
-                data[place] = chance.choice(b'0123456789.,;-e"\n{}[]:#x\xff')
-            else:
-                data[place:place] = chance.choice(
-                    [b"9" * 400, b"e300", b",", b"-", b"["]
-                )
-        path.write_bytes(data)
-        for read in (read_pen, read_raw_pen):
-            with contextlib.suppress(LightpenError):
-                assert np.all(np.isfinite(read(path).leds))
 
 
 def test_the_shared_pen_is_read(shared_data: Path) -> None:

@@ -1,7 +1,6 @@
 """Tests of tables in delimited text."""
 
 import contextlib
-import random
 from pathlib import Path
 
 import numpy as np
@@ -232,19 +231,6 @@ def test_a_cell_without_flaw_is_what_python_reads(cell: str) -> None:
     else:
         with pytest.raises(FileError):
             parse_table(f'led;x\n1;"{cell}"\n1.5;2,5', "t.csv").numbers([0, 1])
-
-
-def test_damaged_tables_are_read_or_refused() -> None:
-    whole = "led,x_mm,y_mm\n" + "".join(f"{n},{n / 7:.4f},-1.5\n" for n in range(1, 30))
-    chance = random.Random(5)
-    for _ in range(500):
-        characters = list(whole)
-        for _ in range(chance.randrange(1, 6)):
-            characters[chance.randrange(len(characters))] = chance.choice(
-                ';,"x\n#.-\t9'
-            )
-        with contextlib.suppress(FileError):
-            assert np.all(np.isfinite(all_numbers("".join(characters))))
 
 
 def test_more_lines_than_fit_the_memory_are_refused() -> None:

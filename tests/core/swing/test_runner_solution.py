@@ -14,7 +14,6 @@ import pytest
 from benchmarks.small_records import entries_of
 
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Code
 from lightpen.record.swings.reading import (
     DISCARDED,
@@ -404,15 +403,6 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(
     assert solved.interrupted() == []
 
 
-def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
-    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
-    solved.see()
-
-    assert solved.status.result is not None
-    assert len(list(solved.results.iterdir())) == 1
-
-
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
     solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
@@ -420,36 +410,6 @@ def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> N
 
     assert solved.status.result is None
     assert solved.in_force() is None
-
-
-def test_without_a_reason_a_tip_that_is_to_be_checked_is_not_accepted(
-    solved: "Station",
-) -> None:
-    solved.runner.ask(lambda workflow: workflow.solving.accept())
-    solved.wait_until(lambda: len(solved.witness.faults) == 1)
-
-    assert solved.status.result is None
-    assert solved.status.activity is Activity.NONE
-    assert "Enter a reason to accept it." in solved.witness.faults[0]
-    assert open_record(solved.record_folder).verdict is None
-
-
-def test_what_was_accepted_can_be_taken_back_and_accepted_again(
-    solved: "Station",
-) -> None:
-    solved.accept("First.")
-    first = solved.status.result
-    assert first is not None
-    solved.runner.ask(lambda workflow: workflow.solving.revoke(first, "Ben"))
-    solved.wait_until(lambda: solved.status.revoked is first)
-
-    assert solved.status.result is None
-    assert solved.in_force() is None
-    solved.accept("Again.")
-    again = solved.in_force()
-    assert again is not None
-    assert again.reason == "Again."
-    assert again.accepted > first.accepted
 
 
 def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
@@ -463,33 +423,6 @@ def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
 
     assert in_force.status.is_capturing
     assert in_force.in_force() is None
-
-
-def test_a_result_that_is_not_in_force_is_not_taken_back(in_force: "Station") -> None:
-    first = in_force.status.result
-    assert first is not None
-    for _ in range(2):
-        in_force.runner.ask(lambda workflow: workflow.solving.revoke(first, "Ben"))
-    in_force.wait_until(lambda: len(in_force.witness.faults) == 1)
-
-    assert "is no longer current" in in_force.witness.faults[0]
-
-
-def test_a_tip_that_is_to_be_repeated_is_not_accepted(
-    station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
-) -> None:
-    rewrite_header(interrupted, {"max_uncertainty_mm": 1e-6})
-    station.go_on(interrupted)
-    station.solve()
-    assert station.status.verdict is not None
-    assert station.status.verdict.grade is Grade.REPEAT
-    assert station.witness.event_kinds[-1] is SwingEventKind.FAILED
-
-    station.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
-    station.see()
-    assert station.status.result is None
-    assert station.in_force() is None
-    assert open_record(interrupted).verdict is None
 
 
 def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None:

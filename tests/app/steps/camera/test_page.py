@@ -614,23 +614,6 @@ def test_a_missing_folder_is_reported_and_tried_again(
     assert "RECORDED" in live.words
 
 
-def test_a_damaged_image_is_counted_and_the_others_are_shown(
-    live: "Seen", workbench: Workbench, tmp_path: Path, qtbot: QtBot
-) -> None:
-    folder = recording(tmp_path / "swing", 3)
-    damaged = folder / "frame_1.png"
-    damaged.write_bytes(damaged.read_bytes()[:-20])
-    live.choose("Recorded images")
-
-    with qtbot.waitSignal(workbench.notifications.raised) as fault:
-        live.enter("Folder, record or video", str(folder))
-
-    assert fault.args is not None
-    assert fault.args[0] == "frame_1.png is cut off. Capture or copy it again."
-    live.wait("Lost: ")
-    assert "80 x 64 px" in live.words
-
-
 def test_the_pen_is_back_after_a_recording(
     live: "Seen", workbench: Workbench, tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -685,49 +668,6 @@ def test_a_camera_that_is_unplugged_is_reported_and_comes_back(
     camera.plug_in()
     seen.wait("10 of 10 LEDs")
     assert "Live" in seen.words
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["folder", "images"])
-def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
-    live: "Seen", small_scene: Scene, tmp_path: Path, kind: str
-) -> None:
-    write_scene(replace(small_scene, n_images=3), tmp_path / "swing")
-    gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
-    live.choose("Recorded images")
-    live.enter("Folder, record or video", str(tmp_path / "swing"))
-    why_not = "Open the intrinsics file."
-    live.wait("Found with the images: camera.yaml and leds.csv")
-    live.until(lambda: live.page.main_action().why_not == why_not)
-    live.click("Use both files")
-    live.wait("10 of 10 LEDs")
-
-    gone.rename(tmp_path / "elsewhere")
-    live.wait("Lost, reconnecting")
-    assert f"Images of {tmp_path / 'swing'} are no longer readable." in live.words
-    assert "Reconnecting automatically." in live.words
-    for stale in ("of 10 LEDs", "fps", "Live"):
-        assert stale not in live.words
-    assert live.markers == ()
-    assert exposure(live) == "No LED detected"
-
-    (tmp_path / "elsewhere").rename(gone)
-    live.wait("10 of 10 LEDs")
-    assert "are no longer readable." not in live.words
-
-
-def test_a_silent_camera_is_reported(
-    seen: "Seen", workbench: Workbench, small_scene: Scene
-) -> None:
-    camera = plugged(workbench, small_scene)
-    seen.page.entered()
-    seen.wait("10 of 10 LEDs")
-
-    camera.stall(4.0)
-
-    seen.wait("The camera responds but sends no images.")
-    assert "No images" in seen.words
-    seen.wait("10 of 10 LEDs")
 
 
 def test_a_search_ends_with_the_images(

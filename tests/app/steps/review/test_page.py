@@ -70,7 +70,7 @@ from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot, ResidualView
-from lightpen_app.steps.review.result_export import LaboratoryDialog, ResultTools
+from lightpen_app.steps.review.result_export import LaboratoryDialog
 from lightpen_app.steps.review.result_panel import (
     ResultPanel,
     StatusMessageList,
@@ -649,19 +649,6 @@ def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
     assert re.search(r"The tip is \d\.\d mm from its nominal centre", said)
 
 
-def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
-    workbench = bed.solve()
-    put_in_force(workbench, tip(workbench))
-    (file,) = workbench.run.archive.folder.glob("*.json")
-    file.write_text("{")
-    bed.solve()
-    page = bed.show()
-
-    assert banner(page).word == "CHECK: No comparison possible"
-    assert "was changed before it was entered" in banner(page).detail
-    assert "No earlier result" in reported_of_result(page)
-
-
 def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
     bed: Bed,
 ) -> None:
@@ -738,20 +725,6 @@ def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(bed: Bed) ->
     assert len(list(workbench.run.archive.folder.glob("*.json"))) == 3
     assert "Acceptance revoked." in page.unsaved()
     assert ") are saved;" not in page.unsaved()
-
-
-def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
-    bed = replace(bed, origin=Origin.SIMULATED)
-    workbench = bed.solve()
-    page = bed.show()
-    page.run_main_action()
-    bed.qtbot.waitUntil(page.is_complete)
-
-    assert banner(page).word == "PRACTICE SAVED"
-    assert in_force(workbench) is None
-    names = workbench.selection.preparation.names
-    archive = workbench.run.archive
-    assert archive.in_force(names.pen, names.tip, is_simulated=True) is not None
 
 
 def test_the_tip_as_found_is_reported_against_its_limit(bed: Bed) -> None:
@@ -1186,22 +1159,6 @@ def test_an_image_that_cannot_be_read_says_why_and_cannot_be_put_back(bed: Bed) 
     assert view.image_size().isEmpty()
 
 
-def test_taking_out_too_many_is_refused_and_nothing_is_lost(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
-) -> None:
-    before = tip(workbench).copy()
-    table(page).selectAll()
-
-    with qtbot.waitSignal(workbench.notifications.raised) as reported:
-        click(page, "Exclude")
-
-    assert "at least 6" in reported.args[0]
-    assert count(page) == included(N_IMAGES)
-    np.testing.assert_array_equal(tip(workbench), before)
-    assert open_record(workbench.run.records_folder / "swing").excluded == {}
-    assert not button(page, "Undo").isEnabled()
-
-
 def test_a_computation_shows_its_progress_and_can_be_cancelled(
     bed: Bed, monkeypatch: pytest.MonkeyPatch, solving_on: "SolvingOn"
 ) -> None:
@@ -1387,19 +1344,6 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     assert run.status.setup is not None
     assert run.status.setup.is_press_test
     assert not any("Press test" in each for each in texts_of(panel))
-
-
-def test_a_result_that_is_gone_is_not_put_on_paper(
-    page: ReviewPage, bed: Bed, qtbot: QtBot
-) -> None:
-    accept(page, qtbot)
-    shutil.rmtree(bed.workbench.run.archive.folder)
-
-    with qtbot.waitSignal(bed.workbench.notifications.raised) as reported:
-        the(page, ResultTools).report_requested.emit()
-
-    assert "LP-04" in reported.args[0]
-    assert page.findChildren(PrintReportWindow) == []
 
 
 def test_an_accepted_swing_is_changed_no_more(

@@ -308,29 +308,6 @@ def test_what_is_typed_is_taken_over_when_the_page_is_left(
     assert workbench.selection.preparation.names.ball_diameter == 3.0005
 
 
-def test_all_of_it_is_remembered_for_the_station(
-    start: Opened, workbench: Workbench, settings: Settings
-) -> None:
-    start.type_into("Operator", "Bea")
-    start.type_into("Pen serial number", "LP-07")
-    start.type_into("Probe tip", "T-3")
-    start.type_into("Cone", "C-9")
-    start.type_into("Ball diameter", "3.0005")
-    start.type_into("Max. expanded uncertainty U (k = 2)", "0.0075")
-    start.type_into("Max. images", "250")
-    start.type_into("Min. images", "80")
-
-    assert settings.await_saved(120.0)
-    again = Workbench(Settings(settings.file), Path("unused"))
-    again.selection.choose_station("Hall 2")
-
-    assert again.selection.preparation.names == Names(
-        "Hall 2", "Bea", "LP-07", "T-3", "C-9", 3.0005
-    )
-    assert again.selection.preparation.limits == SwingLimits(0.0075, 80, 250)
-    again.shut_down()
-
-
 def test_a_known_tip_brings_its_ball_and_nominal_centre(
     start: Opened, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -601,21 +578,6 @@ def test_a_tip_that_was_to_be_checked_stays_amber_with_its_reason(
     assert tones["CHECK"] is tones["Accepted. Reason: New ball."] is Tone.WARN
 
 
-def test_a_simulated_tip_is_shown_for_no_real_pen(
-    show: Show, workbench: Workbench
-) -> None:
-    accepted(workbench, timedelta(days=1))
-    chosen = workbench.selection.preparation.with_source(
-        SourceChoice(SourceKind.RECORDED)
-    )
-    workbench.selection.set_preparation(chosen)
-
-    assert show(workbench).last() == (
-        *("No result yet", "NOT CALIBRATED"),
-        "The first accepted result becomes the current tip.",
-    )
-
-
 def test_the_last_acceptance_is_taken_back_here_too(
     show: Show, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -693,22 +655,6 @@ def test_interrupted_swings_are_offered_the_newest_first(
         *("LP-05  \u00b7  T-10  \u00b7  1 image",),
         *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
     ]
-
-
-def test_a_swing_whose_program_was_killed_as_it_accepted_is_not_offered(
-    show: Show, workbench: Workbench
-) -> None:
-    folder = interrupted(workbench, "a")
-    names = workbench.selection.preparation.names
-    accepted(workbench, timedelta(0))
-    archive = workbench.run.archive
-    stored = archive.in_force(names.pen, names.tip, is_simulated=True)
-    assert stored is not None
-    images = tuple(range(1, 13))
-    workbench.run.archive.store(replace(stored, record=folder, images=images))
-
-    assert show(workbench).rows() == ()
-    assert open_record(folder).verdict == "pass"
 
 
 def test_the_page_is_there_before_the_swings_are_looked_for(
@@ -974,30 +920,6 @@ def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
     qtbot.wait_until(lambda: start.steps == ["swing"])
 
     assert workbench.run.status.record_folder == folder
-
-
-@pytest.mark.slow
-def test_a_record_that_cannot_be_written_is_reported(
-    show: Show, workbench: Workbench, qtbot: QtBot
-) -> None:
-    folder = interrupted(workbench, "a")
-    workbench.camera.open()
-    start = show(workbench)
-    row = start.rows()[0]
-    journal = folder / "journal.jsonl"
-    content = journal.read_bytes()
-
-    start.press("Resume")
-    QThreadPool.globalInstance().waitForDone()
-    journal.unlink()
-    journal.mkdir()  # before the answer of the reading is taken
-    qtbot.wait_until(lambda: bool(start.notices))
-
-    assert "journal.jsonl" in start.notices[-1]
-    assert start.steps == []
-    assert row.words()[1] == "LP-04  \u00b7  T-10  \u00b7  12 images"
-    journal.rmdir()
-    journal.write_bytes(content)
 
 
 def test_to_discard_asks_and_keeps_by_default(show: Show, workbench: Workbench) -> None:

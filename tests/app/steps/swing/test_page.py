@@ -15,7 +15,7 @@ from tests.app.blank_page import BlankPage
 from tests.app.patience import PATIENCE_MS
 from tests.faulty_camera import FaultyCamera, scene_of
 
-from lightpen.cameras.protocol import CameraSettings, Connection
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
@@ -286,25 +286,6 @@ def test_the_step_is_closed_while_something_is_missing(desk: Desk) -> None:
     assert "Open the LED geometry file." in desk.words()
 
 
-def test_a_record_that_cannot_be_made_is_reported_and_tried_again(
-    qtbot: QtBot, desk: Desk
-) -> None:
-    blocker = desk.run.records_folder
-    blocker.parent.mkdir(exist_ok=True)
-    blocker.write_text("not a folder")
-
-    desk.window.go_to(1)
-
-    until(qtbot, lambda: desk.value.instruction == "No swing")
-    until(qtbot, lambda: desk.value.hint in desk.words())
-    assert "No image captured yet" in desk.words()
-
-    blocker.unlink()
-    desk.click("Try again")
-
-    until(qtbot, lambda: desk.value.instruction == "Hold the pen in view")
-
-
 def test_enter_presses_the_filled_button_before_there_is_an_image(
     qtbot: QtBot, desk: Desk
 ) -> None:
@@ -511,26 +492,6 @@ def test_leaving_the_step_pauses_and_coming_back_goes_on(
 
     capturing.window.go_to(1)
     keep_on(qtbot, capturing)
-
-
-def test_a_camera_that_is_unplugged_and_back_costs_nothing(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    around = capturing.workbench.around
-    camera = FaultyCamera(scene_of(around), around.clock)
-    capturing.workbench.live.open([camera], CameraSettings(), around.clock)
-    keep_on(qtbot, capturing)  # on another camera, from the record
-    n_before, n_played = capturing.state.n_kept, len(capturing.recorder.played)
-
-    camera.unplug()
-    until(qtbot, lambda: capturing.value.state.word == "NO IMAGES")
-    assert "The camera sends no images." in capturing.value.hint
-    assert Sound.LOST in capturing.recorder.sounds()[n_played:]
-
-    camera.plug_in()
-    until(qtbot, lambda: capturing.workbench.live.connection is Connection.STREAMING)
-    keep_on(qtbot, capturing)
-    assert capturing.state.n_kept > n_before
 
 
 def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.record.swings.header import HEADER, Names
@@ -33,7 +32,6 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.swing_recorder import read_for_more, read_resumable, record_header
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 BLACK = np.zeros((8, 8), np.uint8)
@@ -179,32 +177,6 @@ def test_of_a_concluded_swing_only_the_end_of_its_journal_is_read(
 
     assert [record.folder.name for record in found.interrupted] == ["open"]
     assert found.damaged == ()
-
-
-def test_an_interrupted_swing_goes_on_with_all_its_images(
-    preparation: Preparation, tmp_path: Path
-) -> None:
-    rng = np.random.default_rng(3)
-    setup = preparation.swing_setup()
-    swing = swing_poses(30, rng)
-    pixels: FloatArray = simulate_centers(
-        setup.camera, setup.pen, swing.rotations, swing.translations, 0.05, rng
-    )
-    with RecordWriter.create(tmp_path / "a", record_header(preparation)) as writer:
-        for index in range(30):
-            writer.append(
-                *(BLACK, pixels[index], swing.rotations[index]),
-                *(swing.translations[index], 0.05 * index),
-            )
-        writer.exclude([7], "tip slipped")
-
-    resumable = read_resumable(tmp_path / "a")
-
-    assert resumable.record.folder == tmp_path / "a"
-    assert resumable.state.n_kept == 29
-    assert resumable.state.next_number == 31
-    assert resumable.state.kept.joint is not None
-    assert resumable.setup.limits == preparation.limits
 
 
 def test_a_swing_goes_on_with_images_of_its_own_size_only(

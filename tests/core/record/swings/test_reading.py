@@ -365,26 +365,6 @@ def test_images_are_taken_out_and_put_back(tmp_path: Path, header: Header) -> No
     assert record.next_number == 5
 
 
-def test_only_swings_without_a_verdict_are_offered_newest_first(
-    tmp_path: Path, header: Header
-) -> None:
-    later = structs.replace(header, created=datetime(2026, 5, 1, tzinfo=UTC))
-    recorded(tmp_path / "swings" / "a", header, 2)
-    recorded(tmp_path / "swings" / "b", later, 1)
-    with RecordWriter.create(tmp_path / "swings" / "c", later) as writer:
-        append(writer)
-        writer.conclude("pass")
-    (tmp_path / "swings" / "no record").mkdir()
-
-    found = find_unfinished(tmp_path / "swings").interrupted
-    assert [record.folder.name for record in found] == ["b", "a"]
-    assert open_record(tmp_path / "swings" / "c").verdict == "pass"
-    with RecordWriter.resume(open_record(tmp_path / "swings" / "c")) as writer:
-        append(writer)  # "Capture more" takes the verdict back
-    assert open_record(tmp_path / "swings" / "c").verdict is None
-    assert find_unfinished(tmp_path / "nothing here").interrupted == ()
-
-
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
@@ -450,21 +430,6 @@ def test_a_write_that_fails_once_leaves_a_journal_to_go_on_with(
     record = open_record(tmp_path / "swing")
     assert record.verdict is None
     assert len(record.images) == 2
-
-
-def test_what_could_not_be_written_is_not_in_the_record(
-    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    with RecordWriter.create(tmp_path / "swing", header) as writer:
-        append(writer)
-        monkeypatch.setattr("lightpen.record.swings.writing.os.fsync", fail)
-        with pytest.raises(FileError, match="The disk is full"):
-            writer.exclude([1], "tip slipped")
-
-    assert open_record(tmp_path / "swing").excluded == {}
 
 
 def test_a_part_of_a_line_that_a_failing_disk_left_is_written_over(

@@ -14,7 +14,6 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.rigid import rotation_from_vector, rotations_of
 from lightpen_extensions.measure.probing.probing import (
     ONE_IMAGE,
-    PRECISE,
     ProbingEvent,
     ProbingEventKind,
     ProbingPhase,
@@ -182,27 +181,6 @@ def test_an_image_without_the_pen_is_named_with_its_reason(
     assert (rejected.name, rejected.reason) == ("image 10", Reason.EMPTY)
 
 
-def test_a_pen_lifted_in_the_middle_is_reported_and_nothing_taken(
-    instrument: Instrument,
-) -> None:
-    up: list[Place] = [
-        (PAPER_CONE + np.array([0.0, -10.0 * i, 0.0]), 0.1) for i in range(1, 6)
-    ]
-
-    state, events = run(instrument, [*moving(), *[HELD] * 5, *up])
-
-    assert [event.what for event in events] == [ProbingEventKind.BROKEN_OFF]
-    assert events[0].names[0] == "image 6"
-    assert state.taken == ()
-
-
-def test_a_pen_that_is_lost_ends_the_touch(instrument: Instrument) -> None:
-    state, events = run(instrument, [*moving(), *[HELD] * 5, *[None] * 8])
-
-    assert [event.what for event in events] == [ProbingEventKind.BROKEN_OFF]
-    assert state.phase is ProbingPhase.MOVING
-
-
 @pytest.mark.parametrize(("n_lost", "is_one"), [(5, True), (6, False)])
 def test_a_touch_goes_on_after_a_few_images_without_the_pen(
     instrument: Instrument, n_lost: int, is_one: bool
@@ -242,15 +220,6 @@ def test_the_noise_of_a_point_is_that_of_its_image(instrument: Instrument) -> No
 
     assert noise[1] == pytest.approx(4 * noise[0])  # never below that of the swing
     assert noise[2] == pytest.approx(16 * noise[0])
-
-
-def test_the_usual_touch_and_the_precise_one_have_so_many_images() -> None:
-    usual = ProbingRules()
-    assert (usual.n_frames, usual.n_settling, PRECISE) == (5, 3, 30)
-    assert (usual.min_turn, usual.min_distance) == (0.0, 0.0)
-    assert ProbingRules(1, 0) == ONE_IMAGE
-    with pytest.raises(ValueError, match="Nothing can be touched"):
-        ProbingRules(n_settling=-1)
 
 
 def observation(
@@ -390,15 +359,6 @@ def test_a_pen_is_held_on_a_known_place_in_vain(instrument: Instrument) -> None:
     state, events = run(instrument, [HELD] * 2, rules, known)
 
     assert (state.phase, len(state.held), events) == (ProbingPhase.KNOWN, 2, [])
-
-
-def test_two_images_of_a_touch_must_agree(instrument: Instrument) -> None:
-    rules = ProbingRules(n_frames=2, n_settling=0)
-    state, events = run(instrument, [HELD, HELD], rules)
-
-    assert [event.names for event in events] == [("image 0", "image 1")]
-    assert len(state.taken) == 1
-    assert ProbingState().n_lost == 0
 
 
 def test_an_image_between_two_places_is_neither(instrument: Instrument) -> None:

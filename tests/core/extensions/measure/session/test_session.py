@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from tests.accepted_tip import Hold, Holder, leant, round_a_ring
+from tests.accepted_tip import Hold, Holder, leant
 from tests.verifying import BAR, CHOICES, LENGTH, found_by
 
 from lightpen.cameras.pairing import SkippingClock
@@ -137,18 +137,6 @@ def session(instrument: Instrument) -> Session:
     return Session(setup, Holder(instrument.rig, instrument.pen))
 
 
-def test_a_task_ends_when_its_runs_are_done(session: Session) -> None:
-    session.choose(PART)
-    session.touch(*round_a_ring(11, 31.751)[:10])
-    assert len(session.state.runs) == 1
-    assert not session.state.touches
-    session.touch(*BAR)
-
-    assert session.state.done is PART
-    assert found_by(session.state, PART).assessment.grade is Grade.SCALE
-    assert session.says() == "session.done"
-
-
 @pytest.mark.parametrize("task", TASKS, ids=str)
 def test_the_simulated_hand_completes_each_task(
     session: Session, task: AnyTask
@@ -191,18 +179,6 @@ def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_reported_so(
     session.touch(first)
     assert len(session.state.touches) == 1
     assert session.says() == "session.touch-cone"
-
-
-@pytest.mark.parametrize(("n_images", "is_reported"), [(4, False), (5, True)])
-def test_a_touch_is_broken_off_once_half_of_its_images_are_held(
-    session: Session, n_images: int, is_reported: bool
-) -> None:
-    choices = replace(session.setup.choices, n_cone_frames=4)
-    session.setup = replace(session.setup, choices=choices)
-    session.see(session.holder.still(leant(4)[0], n_images))
-    session.see(session.holder.away())
-
-    assert bool(session.events) == is_reported  # from 3 + 4 / 2 images on
 
 
 def test_a_pen_that_was_laid_down_is_no_touch_of_the_cone(session: Session) -> None:
