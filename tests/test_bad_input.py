@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -145,24 +144,6 @@ def test_a_missing_file_is_refused_by_name(
     assert outcome.returncode == 2
 
 
-@pytest.mark.parametrize(
-    ("size", "words"), [(("1024", "1224"), "1024"), (("612", "512"), "612")]
-)
-def test_a_camera_of_another_image_size_is_refused_with_both_sizes(
-    size: tuple[str, str], words: str, swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "other-camera.yaml"
-    text = swing.camera.read_text(encoding="utf-8")
-    text = text.replace("image_width: 1224", f"image_width: {size[0]}")
-    text = text.replace("image_height: 1024", f"image_height: {size[1]}")
-    if size[0] == "612":
-        text = re.sub(r"2319\.1|2318\.55|609\.55|515\.4",
-                      lambda number: str(float(number[0]) / 2), text)  # fmt: skip
-    file.write_text(text, encoding="utf-8")
-    outcome = swing.calibrate(lightpen, camera=file, images=swing.images)
-    assert_refused(outcome, words, "1224")
-
-
 def scale(*factors: float) -> Edit:
     """Scale x, y and z."""
 
@@ -205,19 +186,6 @@ def test_a_center_outside_the_image_is_refused_or_not_used(
     assert_tip(outcome, swing)
     frame = json.loads(out.read_text(encoding="utf-8"))["frames"][0]
     assert not any(led["used"] for led in frame["leds"] if led["led"] == 5)
-
-
-def test_centers_of_another_camera_are_refused(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    def halve(table: list[list[str]]) -> None:
-        for row in table:
-            row[2:] = [str(float(cell) / 2) for cell in row[2:]]
-
-    file = tmp_path / "bad-centers.csv"
-    text = swing.centers.read_text(encoding="utf-8")
-    file.write_text(rows(halve)(text), encoding="utf-8")
-    assert_refused(swing.calibrate(lightpen, centers=file))
 
 
 @pytest.fixture(scope="module")
@@ -295,18 +263,6 @@ def test_a_folder_of_nothing_but_corrupt_images_is_refused(
     assert "spots" not in outcome.stderr  # nobody has seen any
 
 
-@pytest.mark.parametrize("name", ["frame_0001.png", "frame_0020.png"])
-def test_an_image_of_another_size_is_dropped_by_name(
-    swing: Swing, images: Path, lightpen: Run, name: str
-) -> None:
-    odd = images / name
-    write(odd, read(odd)[:512, :612])
-    outcome = swing.calibrate(lightpen, images=images)
-    assert_tip(outcome, swing)
-    assert name in outcome.stdout
-    assert "39 of 40 used" in outcome.stdout
-
-
 @pytest.mark.parametrize("name", ["nowhere", "nowhere/*.png", "nowhere.avi"])
 def test_images_that_do_not_exist_are_refused_by_name(
     name: str, swing: Swing, lightpen: Run, tmp_path: Path
@@ -326,48 +282,6 @@ def test_other_files_beside_the_images_do_no_harm(
     outcome = swing.calibrate(lightpen, images=images)
     assert_tip(outcome, swing)
     assert "40 of 40 used" in outcome.stdout
-
-
-def peak_megabytes(arguments: list[str | Path]) -> tuple[CompletedProcess[str], int]:
-    """Run the program and measure the memory of its process alone."""
-    code = (
-        "import re, sys\n"
-        "from lightpen_program.extensions import main\n"
-        "status = main(sys.argv[1:])\n"
-        "text = open('/proc/self/status').read()\n"
-        "print(re.search(r'VmHWM:\\s+(\\d+)', text)[1], end='', file=sys.stderr)\n"
-        "sys.exit(status)\n"
-    )
-    outcome = subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        capture_output=True, encoding="utf-8", timeout=120, check=False,
-    )  # fmt: skip
-    message, _, peak = outcome.stderr.rpartition("\n")
-    outcome.stderr = message
-    return outcome, int(peak) // 1000
-
-
-@pytest.mark.slow
-@needs_linux
-@pytest.mark.parametrize("role", [*ROLES, "images"])
-def test_a_huge_file_is_refused_before_it_fills_the_memory(
-    role: str, swing: Swing, images: Path, tmp_path: Path
-) -> None:
-    suffix = {"camera": ".yaml", "images": ".png"}.get(role, ".csv")
-    file = (images if role == "images" else tmp_path) / f"huge{suffix}"
-    with file.open("wb") as sparse:
-        sparse.truncate(3_000_000_000)
-    if role == "poses":
-        arguments: list[str | Path] = ["pivot", file]
-    else:
-        arguments = swing.arguments(**{role: images if role == "images" else file})
-    outcome, peak = peak_megabytes(arguments)
-    assert peak < 500
-    if role == "images":
-        assert file.name in outcome.stdout + outcome.stderr
-    else:
-        assert_refused(outcome, re.escape(file.name), r"\d+ (MB|bytes)")
-        assert outcome.returncode == 2
 
 
 def with_disk_of(size: int, script: Run) -> Run:
@@ -525,18 +439,6 @@ def test_a_record_is_not_written_over_an_image(
 
     assert_refused(outcome, "would replace the input file")
     assert image.read_bytes() == before
-
-
-@needs_posix
-def test_a_record_is_not_written_to_a_link_to_itself(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    loop = tmp_path / "loop"
-    loop.symlink_to(loop)
-    outcome = swing.calibrate(lightpen, "--json", loop)
-
-    assert outcome.returncode == 2
-    assert "leads back to itself" in outcome.stderr
 
 
 def test_more_images_than_can_be_held_are_not_simulated(

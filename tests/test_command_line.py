@@ -198,41 +198,6 @@ def test_the_program_says_its_version(script: Run, clean: Path, record: Record) 
     assert record(clean)["program"]["version"] in outcome.stdout
 
 
-def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
-    clean: Path, record: Record
-) -> None:
-    fields = record(clean)
-    verdict = fields["verdict"]
-
-    assert (verdict["grade"], verdict["next_step"]) == ("pass", "accept")
-    assert verdict["code"] == "verdict.good-unchecked"
-    weakest = fields["weakest_direction"]["expanded_uncertainty_mm"]
-    assert verdict["values"]["uncertainty"] == weakest
-    assert verdict["values"]["what"]["code"] == "unchecked.scale"
-    assert verdict["limits"] == {
-        "max_uncertainty_mm": 0.012,
-        "min_images": 60,
-        "min_per_field": 2,
-    }
-    assert fields["text"].splitlines()[-2:] == [
-        f"Verdict      PASS: {verdict['text']}",
-        "             Next: accept the tip.",
-    ]
-
-
-def test_two_stage_can_be_the_method(
-    clean: Path, clean_centers: Path, record: Record, truth: Truth
-) -> None:
-    fields = record(clean, "--centers", str(clean_centers), "--method", "two-stage")
-    assert fields["tip_pen_mm"] == fields["methods"]["two-stage"]["tip_pen_mm"]
-    # An independent solver of the same method errs by 28.7 um on this set.
-    assert 4.0 < tip_error_um(fields, truth(clean)) < 60.0
-    np.testing.assert_allclose(
-        fields["expanded_uncertainty_mm"],
-        2 * np.sqrt(np.diag(fields["covariance"]))[:3],
-    )
-
-
 def test_a_part_of_the_images_can_be_used(
     clean: Path, clean_centers: Path, record: Record
 ) -> None:
@@ -281,21 +246,6 @@ def test_a_nominal_tip_with_negative_numbers_is_taken(
     assert_printed(nominal, fields["text"])
     text = re.sub(r"\s", "", json.dumps(fields))
     assert re.sub(r"\s", "", json.dumps(nominal)) in text
-
-
-def test_a_pattern_selects_images(
-    simulated: Path, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "out.json"
-    outcome = lightpen(
-        "calibrate", simulated / "images" / "frame_00[12]?.png",
-        *input_options(simulated), "--json", file,
-    )  # fmt: skip
-    assert outcome.returncode == 0, outcome.stderr
-    frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
-    assert [Path(frame["file"]).name for frame in frames] == [
-        f"frame_{i:04d}.png" for i in range(10, 30)
-    ]
 
 
 def test_a_pattern_that_the_shell_has_expanded_selects_images(
@@ -582,23 +532,6 @@ def test_a_simulated_set_has_the_files_of_the_shared_sets(
     assert image is not None
     assert image.shape == (2048, 2448)
     assert image.dtype == np.uint8
-
-
-def test_a_simulated_camera_and_pen_have_the_format_of_the_shared_sets(
-    small: Path, clean: Path
-) -> None:
-    names = []
-    for folder in (small, clean):
-        storage = cv2.FileStorage(str(folder / "camera.yaml"), cv2.FileStorage_READ)
-        names.append(sorted(storage.root().keys()))
-        assert storage.getNode("camera_matrix").mat().shape == (3, 3)
-    # Simulated files state their uncertainties besides.
-    assert names[0] == sorted([*names[1], "intrinsics_covariance"])
-    headers = [
-        (folder / "leds.csv").read_text(encoding="utf-8").splitlines()[0]
-        for folder in (small, clean)
-    ]
-    assert headers[0].startswith(headers[1])
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,10 @@ from typing import Any
 
 import pytest
 
-from lightpen.detection.observations import observe_images
-from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.files import sha256
 from lightpen.record.swings.header import HEADER
 from lightpen.record.swings.reading import JOURNAL, image_name, open_record
-from lightpen.record.swings.solving import solve_record, source
-from lightpen.record.swings.writing import note_excluded
+from lightpen.record.swings.solving import solve_record
 
 Run = Callable[..., CompletedProcess[str]]
 N_IMAGES = 20
@@ -116,38 +113,6 @@ def test_the_verdict_goes_by_the_limits_of_the_record(
     assert f"Verdict      REPEAT: {verdict['text']}\n" in untouched["text"]
 
 
-def test_images_taken_out_are_named_with_their_reason(
-    calibrated: Calibrated, folder: Path
-) -> None:
-    note_excluded(folder, {2: "taken out", 9: "taken out", 5: "tip slipped"})
-    fields, text = calibrated(folder)
-    frames = {frame["file"]: frame for frame in fields["frames"]}
-
-    assert fields["images"] == {
-        "total": N_IMAGES,
-        "used": N_IMAGES - 3,
-        "dropped": {"taken out": 2, "tip slipped": 1},
-    }
-    assert frames["000009.png"]["reason"] == "taken out"
-    assert frames["000005.png"]["reason"] == "tip slipped"
-    assert "2 taken out: 000002.png, 000009.png" in text
-    assert "1 tip slipped: 000005.png" in text
-
-
-@pytest.mark.slow
-def test_the_mask_of_the_record_is_in_force(
-    calibrated: Calibrated, folder: Path, rewrite_header: Callable[..., None]
-) -> None:
-    rewrite_header(folder, mask_px=[[612.0, 512.0, 90.0]])
-    found = source(open_record(folder))
-    masked = observe_images(found.images, found.camera, found.pen, mask=found.masks[0])
-    bare = observe_images(found.images, found.camera, found.pen)
-    tip = calibrated(folder)[0]["tip_pen_mm"]
-
-    assert tip == calibrate(found.camera, found.pen, masked).joint.tip_pen.tolist()
-    assert tip != calibrate(found.camera, found.pen, bare).joint.tip_pen.tolist()
-
-
 @pytest.mark.parametrize("is_gone", [False, True])
 def test_a_damaged_or_lost_image_is_left_out_and_named(
     calibrated: Calibrated, folder: Path, is_gone: bool
@@ -209,27 +174,6 @@ def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
         "lightpen: The record swing 1 contains no images. Resume the swing, or start "
         "a new one.\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "sentence"),
-    [
-        (JOURNAL, b'{"kind": "image"}\n{}\n', "Line 1 of "),
-        ("pen.json", None, "pen.json does not exist."),
-    ],
-)
-def test_a_damaged_record_is_refused_with_what_is_wrong(
-    lightpen: Run, folder: Path, name: str, content: bytes | None, sentence: str
-) -> None:
-    if content is None:
-        (folder / name).unlink()
-    else:
-        (folder / name).write_bytes(content)
-    outcome = lightpen("calibrate", folder)
-
-    assert outcome.returncode == 2
-    assert sentence in outcome.stderr
-    assert outcome.stdout == ""
 
 
 @pytest.mark.parametrize(

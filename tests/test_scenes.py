@@ -229,19 +229,6 @@ def test_degenerate_swings_are_refused_by_either_method(
     assert not file.exists()
 
 
-@pytest.mark.parametrize("n_images", [1, 2, 3])
-def test_too_few_images_are_refused_and_more_asked_for(
-    n_images: int, scene: Scene, lightpen: Run, tmp_path: Path
-) -> None:
-    folder = scene(*CLEAN)
-    images = tmp_path / "images"
-    images.mkdir()
-    for path in sorted((folder / "images").iterdir())[:n_images]:
-        shutil.copy(path, images)
-    outcome = calibrate_set(lightpen, folder, images=images)
-    assert_refused(outcome, rf"\b({n_images}|one|two|three)\b.*image|image.*{n_images}")
-
-
 def test_one_image_again_and_again_is_refused(
     scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:

@@ -238,18 +238,6 @@ def test_a_result_that_was_changed_is_refused(
     assert "was modified or damaged after it was written." in outcome.stderr
 
 
-def test_a_record_without_a_checksum_is_refused(
-    verify_with: Callable[[dict[str, Any]], CompletedProcess[str]], tip: Path
-) -> None:
-    record = read(tip)
-    del record["checksum"]
-
-    outcome = verify_with(record)
-
-    assert outcome.returncode == 2
-    assert "is not a calibration record" in outcome.stderr
-
-
 def test_a_tip_of_another_pen_is_refused(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:
@@ -264,17 +252,6 @@ def test_a_tip_of_another_pen_is_refused(
     assert outcome.returncode == 2
     assert "was calibrated with the LED file leds.csv," in outcome.stderr
     assert "lp05_leds.csv. Give that LED file" in outcome.stderr
-
-
-def test_what_is_no_ring_is_refused(
-    shared_data: Path, lightpen: Run, files: list[str | Path]
-) -> None:
-    cone = shared_data / "fixed-point"
-
-    outcome = lightpen("verify", "circle", cone, "--radius", "31.751", *files)
-
-    assert outcome.returncode == 1
-    assert "do not determine a circle" in outcome.stderr
 
 
 def test_a_pen_lifted_in_the_middle_is_named(

@@ -123,18 +123,6 @@ def exchange_results(plant: Plant) -> None:
     shutil.copy(results / "000001.json", results / f"{N_RESULTS:06d}.json")
 
 
-def by_sql(*statements: str) -> Callable[[Plant], None]:
-    """Return what changes an archive with a tool that knows SQL."""
-
-    def change(plant: Plant) -> None:
-        archive = plant.data / ARCHIVE
-        with closing(sqlite3.connect(archive)) as connection, connection:
-            for statement in statements:
-                assert connection.execute(statement).rowcount > 0
-
-    return change
-
-
 DROP_LAST = f"DELETE FROM archive_entries WHERE number = {N_ENTRIES}"
 
 
@@ -225,19 +213,6 @@ KINDS: dict[str, Callable[[Plant], None]] = {
     "two images were swapped": swap_images,
     "a change of the library was modified": partial(overwrite, "library/000001.json"),
     "limits were removed": partial(remove, "limits/000002.json"),
-    "the text of an entry was modified": by_sql(
-        "UPDATE archive_entries SET text = replace(text, 'lightpen', 'lightpin')"
-        " WHERE number = 4"
-    ),
-    "a searched column of an entry was modified": by_sql(
-        "UPDATE archive_entries SET pen = 'LP-05' WHERE number = 4"
-    ),
-    "an entry was removed": by_sql("DELETE FROM archive_entries WHERE number = 4"),
-    "the last entry was removed": by_sql(DROP_LAST),
-    "a record was modified": by_sql(
-        "UPDATE archive_records SET text = replace(text, '2.0', '2.5')"
-    ),
-    "a record was removed": by_sql("DELETE FROM archive_records"),
     "the chain was written anew with right hashes": rewrite,
     "the archive was begun anew": empty,
     "the archive was replaced by an older copy": roll_back_archive,

@@ -1,10 +1,8 @@
 """The trend of a tip, two of its calibrations compared, and how well they repeat."""
 
-import json
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -73,29 +71,6 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     assert trend.control.center[0] == pytest.approx(1.09)
     reach = 3 * np.mean([0.1, 0.1, 0.2, 0.1, *[0.0] * 5]) / 1.128
     assert trend.control.upper[0] == pytest.approx(1.09 + reach)
-
-
-def enter_touches(database: Database, w: float, tip: str = "T-10") -> StoredEntry:
-    """Enter a fixed point of three touches that scatter along the view."""
-    points = [[0.0, 0.0, 1000.0 + offset] for offset in (-w, 0.0, w)]
-    record = json.dumps(
-        {
-            "created": NOON.isoformat(),
-            "calibrated": {"points_cam_mm": points},
-            "expected_std_mm": [0.001, 0.001, 0.001],
-        }
-    )
-    event = Event(
-        kind=Kind.VERIFICATION,
-        at=NOON,
-        names=Names(pen="LP-04", tip=tip),
-        program="lightpen 1",
-        settings={"verified": "fixed point"},
-        record_sha256=sha256(record.encode()).hexdigest(),
-    )
-    entry = append(database, own_chain(database), event, record)
-    assert entry is not None
-    return entry
 
 
 def test_a_tip_that_was_taken_back_is_not_in_the_trend(database: Database) -> None:

@@ -15,7 +15,6 @@ from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.observations import observe_images
 from lightpen.detection.pen_detection import detect_pen
-from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.decoding import encode_png, read_image
@@ -104,24 +103,6 @@ def test_it_begins_with_the_first_image_whichever_is_shown(
     for frame in frames[20:]:
         recording.take(frame)
     assert station.state.progress.n_read == station.n_recorded == 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spoiled", [7, N_IMAGES - 1])
-def test_an_image_that_cannot_be_read_is_passed_over(
-    station: "Station", swung: Callable[..., Path], tmp_path: Path, spoiled: int
-) -> None:
-    images = tmp_path / "images"
-    shutil.copytree(swung() / "images", images)
-    sorted(images.iterdir())[spoiled].write_bytes(b"no image")
-    recording = Recording(station, images)
-    station.begin()
-    while station.status.is_capturing:
-        recording.show(1)
-    station.wait_for_phase(Phase.VERDICT)
-
-    assert station.n_recorded == N_IMAGES - 1
-    assert station.state.n_dropped == {Reason.UNREADABLE: 1}
 
 
 @pytest.mark.slow

@@ -413,23 +413,6 @@ def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
 # The end
 
 
-def test_an_end_while_images_are_captured_keeps_all_of_them(
-    station: "Station", interrupted: Path
-) -> None:
-    station.go_on(interrupted)
-    station.keep(2)
-    setup, detection = station.status.setup, station.state.detection
-    station.runner.shut_down()
-    assert station.runner.await_end(TIMEOUT)
-    station.runner.process_image(
-        station.camera.read(1.0), detection, setup
-    )  # comes too late
-
-    assert len(open_record(interrupted).images) == N_IMAGES + 2
-    assert station.interrupted() == [interrupted]
-    assert station.is_free(interrupted)
-
-
 def test_an_end_while_a_solution_is_computed_leaves_the_swing_to_be_resumed(
     station: "Station", interrupted: Path
 ) -> None:

@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
-
 from lightpen.record.swings.reading import DISCARDED, IMAGES, JOURNAL, open_record
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
@@ -49,22 +47,6 @@ def test_a_record_that_cannot_be_made_is_reported_once_and_tried_again_when_aske
     assert present.status.is_capturing
     assert present.status.refusal is None
     assert present.witness.reliefs == [sentence]
-
-
-@pytest.mark.slow
-def test_leaving_pauses_and_coming_back_goes_on(
-    present: "Station", interrupted: Path
-) -> None:
-    present.go_on(interrupted)
-    present.keep(1)
-    present.runner.ask(lambda workflow: workflow.note_departure())
-    present.wait_until(lambda: present.status.is_paused_by_user)
-    n_images = present.n_recorded
-    present.see(30)
-    assert present.n_recorded == n_images
-
-    present.runner.ask(lambda workflow: workflow.note_arrival())
-    present.keep(1)
 
 
 def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(

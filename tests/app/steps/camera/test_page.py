@@ -241,13 +241,6 @@ def test_what_a_narrow_image_has_no_room_for_is_left_out_from_the_end(
     assert "px" not in panel.figures()
 
 
-def test_the_simulated_pen_comes_by_itself(seen: "Seen") -> None:
-    seen.page.entered()
-
-    seen.wait("10 of 10 LEDs")
-    assert exposure(seen) == "OK: 10 LEDs"
-
-
 def test_spots_that_are_no_leds_are_dashed(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:

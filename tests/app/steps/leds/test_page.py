@@ -573,17 +573,6 @@ def test_changes_outlive_another_file_that_another_step_puts_in_use(
     assert (why_not(seen), seen.page.unsaved()) == ("", "")
 
 
-def test_the_simulated_pens_file_asks_before_changes_are_lost(seen: "Seen") -> None:
-    type_cell(seen, 7, Y, "161")
-
-    seen.click("Use file of the simulated pen")
-    assert cell(seen, 7, Y) == "161"
-    seen.click("Discard changes")
-
-    assert cell(seen, 7, Y) == "160"
-    assert seen.page.unsaved() == ""
-
-
 def test_leds_are_added_and_removed(seen: "Seen") -> None:
     remove = seen.named("Remove")
     assert not remove.isEnabled()

@@ -640,23 +640,6 @@ def test_a_damaged_result_is_reported_where_the_result_would_be(
 # Interrupted swings
 
 
-def test_interrupted_swings_are_offered_the_newest_first(
-    show: Show, workbench: Workbench
-) -> None:
-    interrupted(workbench, "a", hours_ago=30)
-    interrupted(
-        workbench, "b", hours_ago=2, n_images=1, names=replace(NAMES, pen="LP-05")
-    )
-    interrupted(workbench, "c", hours_ago=50)
-
-    reported = [row.words()[1] for row in show(workbench).rows()]
-
-    assert reported == [
-        *("LP-05  \u00b7  T-10  \u00b7  1 image",),
-        *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
-    ]
-
-
 def test_the_page_is_there_before_the_swings_are_looked_for(
     qtbot: QtBot, workbench: Workbench
 ) -> None:
@@ -1075,12 +1058,6 @@ def window(
     page.show_setup()
     yield window
     window.close()
-
-
-def test_whoever_finds_all_as_it_was_goes_on_by_one_key(window: MainWindow) -> None:
-    QTest.keyClick(focused(), Key.Key_Return)
-
-    assert window.page().key == "camera"
 
 
 def test_enter_after_a_name_of_a_station_only_takes_it_over(

@@ -46,7 +46,6 @@ SHORT = SwingLimits(
 )
 LONG = SwingLimits(max_uncertainty=1e-5, min_images=5000, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
-UPRIGHT = Posture(0.0, 0.0, 0.0)
 
 
 class Recorder:
@@ -514,28 +513,6 @@ def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
     capturing.type(Key.Key_Space)
 
 
-def test_a_full_disk_pauses_with_its_sentence_and_space_goes_on(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    resource = pytest.importorskip("resource")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, before[1]))
-    try:
-        until(qtbot, lambda: "could not be recorded" in capturing.value.hint)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert capturing.value.instruction == "Paused"
-    until(qtbot, lambda: "cannot be written" in capturing.words())
-    n_before = capturing.state.n_kept
-
-    capturing.type(Key.Key_Space)
-    keep_on(qtbot, capturing)
-
-    folder = capturing.run.status.record_folder
-    assert folder is not None
-    assert len(open_record(folder).used_images) >= n_before + 3
-
-
 def test_a_camera_that_was_closed_can_be_opened_here(
     qtbot: QtBot, capturing: Desk
 ) -> None:
@@ -564,19 +541,6 @@ def test_finishing_early_says_what_is_missing_and_can_be_declined(
 
     assert asked(capturing) == ""
     keep_on(qtbot, capturing)
-
-
-@pytest.mark.slow
-def test_finishing_early_gives_a_verdict_that_says_why(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    keep_on(qtbot, capturing, 8)
-    capturing.finish()
-
-    until(qtbot, lambda: capturing.run.status.state is not None)
-    until(qtbot, lambda: capturing.state.phase is Phase.VERDICT)
-    until(qtbot, lambda: capturing.value.state.word in {"REPEAT", "NO TIP"})
-    assert capturing.recorder.sounds()[-1] is Sound.FAILED
 
 
 def test_closing_the_window_asks_and_names_the_images(

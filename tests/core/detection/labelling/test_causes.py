@@ -21,7 +21,6 @@ from lightpen_extensions.simulator.swings import (
 )
 
 CAMERA, PEN = paper_camera(), paper_pen()
-SHIFTED = replace(CAMERA, cx=CAMERA.cx + 320, cy=CAMERA.cy - 200)
 LAST = np.array(CAMERA.image_size) - 1.0
 
 

@@ -249,23 +249,6 @@ def test_the_camera_as_adjusted_is_nearer_to_the_truth_than_its_file() -> None:
     assert not result.contradictions
 
 
-def test_what_the_images_want_is_reported_no_finer_than_they_know_it() -> None:
-    found = Contradiction(
-        what=DIAMETER,
-        unit="mm",
-        stated=9.0,
-        stated_uncertainty=0.04,
-        estimated=10.0611,
-        estimated_uncertainty=0.11,
-        deviations=18.0,
-        camera="",
-        of_rig=False,
-        of_pen=True,
-    )
-    words = "diameter of the discs 10.06 \u00b1 0.11 mm from the images, 9 \u00b1 "
-    assert words in str(found.message)
-
-
 def test_each_number_of_a_camera_can_be_changed_alone() -> None:
     numbers = _of_camera(CAMERA, CAMERA)
 

@@ -129,21 +129,6 @@ def test_many_rejected_centres_are_checked_with_their_led(good: Calibration) -> 
     assert found.where == message("rejected.upper-left")
 
 
-@pytest.mark.slow
-def test_five_dark_leds_say_nothing_about_the_seat() -> None:
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        swing = swing_poses(60, rng)
-        leds = PEN.leds + rng.normal(0, 0.02, PEN.leds.shape)
-        pixels = simulate_centers(
-            *(CAMERA, replace(PEN, leds=leds), swing.rotations, swing.translations),
-            *(0.05, rng),
-        )
-        pixels[:, rng.permutation(10)[:5]] = np.nan
-        found = calibrate_pixels(pixels, CAMERA, PEN)
-        assert "warning.seat-jitter" not in {each.code for each in warnings_of(found)}
-
-
 @pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
 def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
     good: Calibration, share: float, grade: Grade
@@ -153,18 +138,6 @@ def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
     assert verdict.grade is grade
     assert good.budget.largest_share.name is ContributionName.NOISE
     assert verdict.reason.code == Code.UNCERTAIN
-
-
-def test_halves_that_differ_are_checked(good: Calibration) -> None:
-    uncertainty = good.halves.expanded_uncertainty
-    halves = SplitHalfCheck(np.array([0.0, -1.6, 1.0]) * uncertainty, uncertainty)
-    verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.02))
-    assert verdict.grade is Grade.CHECK
-    assert verdict.reason.code == Code.HALVES_DIFFER
-    assert verdict.reason.values == {
-        "difference": 1.6 * uncertainty[1],
-        "usual": uncertainty[1],
-    }
 
 
 def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
@@ -179,13 +152,6 @@ def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
 
     small = SplitHalfCheck(np.array([0.004, 0.006, 0.0]), uncertainty)
     assert judge(replace(good, halves=small), limits).grade is Grade.PASS
-
-
-def test_what_must_be_repeated_cannot_be_accepted() -> None:
-    good = message(Code.GOOD, uncertainty=0.004)
-    assert {each for each in Grade if not Verdict(each, good).can_be_accepted} == {
-        Grade.REPEAT
-    }
 
 
 def test_leds_that_do_not_fit_are_checked() -> None:
@@ -353,13 +319,6 @@ def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
     assert distance_from_nominal(tip, tip - [3.0, 4.0, 0.0]) == pytest.approx(5.0)
 
 
-def test_many_dropped_images_are_checked(good: Calibration) -> None:
-    used = good.used.copy()
-    used[::4] = False
-    verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.02))
-    assert verdict.reason == message(Code.MANY_DROPPED, n_dropped=38, n_images=150)
-
-
 def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> None:
     """A camera that runs before and after the swing says nothing about the tip."""
     no_pen = (Reason.EMPTY, Reason.TOO_FEW_LEDS, Reason.BLURRED, Reason.UNREADABLE)
@@ -391,17 +350,6 @@ def test_images_of_the_pen_that_are_left_out_count(
         else message(Code.MANY_DROPPED, n_dropped=31, n_images=150)
     )
     assert verdict.reason == reported
-
-
-def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
-    good: Calibration,
-) -> None:
-    limits = SwingLimits(max_uncertainty=0.02, min_images=150)
-    assert judge(good, limits).grade is Grade.PASS
-
-    verdict = judge(good, replace(limits, min_images=151))
-    assert verdict.grade is Grade.CHECK
-    assert verdict.reason == message(Code.TOO_FEW_IMAGES, n_kept=150, needed=151)
 
 
 def test_sides_that_the_pen_never_leant_to_are_named() -> None:

@@ -1,6 +1,5 @@
 """Tests of two cameras that see one board."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.pair import PairCalibration, calibrate_pair
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
-MakeViews = Callable[..., Views]
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))
 SHIFT = np.array([-120.0, 3.0, 12.0])
 NAMES = ("left", "right")

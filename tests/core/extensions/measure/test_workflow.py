@@ -36,7 +36,6 @@ from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_extensions.measure.workflow import VerificationWorkflow
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
-UPRIGHT = (Hold(tilt=0.0),) * 3
 EVE = Signature("Eve", "correct horse")
 
 

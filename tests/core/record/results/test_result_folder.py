@@ -1,15 +1,11 @@
 """Accepted tips: the last one of a pen and tip is in force, and none is ever lost."""
 
-import errno
 import json
-import os
 import pickle
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from hashlib import sha256
@@ -209,23 +205,6 @@ def test_programs_that_accept_at_once_take_one_number_each(
     ]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs names that are not links")
-def test_on_a_disk_without_links_two_programs_take_one_number_each_too(
-    archive: FolderArchive, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(self: Path, target: Path) -> None:
-        raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
-
-    monkeypatch.setattr(Path, "hardlink_to", refuse)
-    with ThreadPoolExecutor(N_RIVALS) as threads:
-        list(threads.map(archive.store, [result(3.0 * n) for n in range(20)]))
-
-    assert sorted(
-        json.loads(f.read_bytes())["calibration"]["cone_cam_mm"][0]
-        for f in files_of(archive)
-    ) == [3.0 * n for n in range(20)]
-
-
 @pytest.mark.parametrize(
     "name",
     ["a/b\\c", "王 Ä", "w" * 200, "..", "T 10 ", "\udce4", "\x00\n", "T" * 20_000],
@@ -265,16 +244,6 @@ def test_a_damaged_result_is_reported_and_not_passed_over(
     with pytest.raises(FileError, match="000002") as caught:
         archive.in_force("LP-04", "T-10")
     assert str(file) in str(caught.value)
-
-
-def test_a_result_cut_anywhere_is_damaged(archive: FolderArchive) -> None:
-    archive.store(result())
-    (file,) = files_of(archive)
-    content = file.read_bytes()
-    for length in range(0, len(content) - 2, 7):
-        file.write_bytes(content[:length])
-        with pytest.raises(FileError, match="000001"):
-            archive.in_force("LP-04", "T-10")
 
 
 @pytest.mark.parametrize(
@@ -525,68 +494,6 @@ def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match="cannot be created"):
         FolderArchive(tmp_path / "data").store(result())
-
-
-OTHER_PROCESS = """
-import resource, signal, sys
-from pathlib import Path
-from lightpen.errors import FileError
-from lightpen.record.results.result_folder import FolderArchive
-sys.path.insert(0, sys.argv[1])
-from test_result_folder import result
-
-archive, limit = FolderArchive(Path(sys.argv[2])), int(sys.argv[3])
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-try:
-    archive.store(result(6.0))
-except FileError as error:
-    print(error)
-"""
-
-
-def stored_elsewhere(
-    archive: FolderArchive, limit: int = 100_000, words: Sequence[str] = ()
-) -> str:
-    """Store in a process whose files may have so many bytes; return what it says."""
-    own, data = Path(__file__).parent, archive.folder.parent
-    child = subprocess.run(
-        [*words, sys.executable, "-c", OTHER_PROCESS, own, data, str(limit)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return child.stdout
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of file sizes")
-def test_a_full_disk_is_reported_and_keeps_the_old_tip_in_force(
-    archive: FolderArchive,
-) -> None:
-    archive.store(result(3.0))
-
-    assert "cannot be written" in stored_elsewhere(archive, limit=100)
-
-    assert len(list(archive.folder.iterdir())) == 1
-    assert x_in_force(archive) == 1.0
-    assert stored_elsewhere(archive) == ""
-    assert x_in_force(archive) == 2.0
-
-
-@pytest.mark.slow
-def test_a_write_protected_folder_is_reported_and_keeps_the_old_tip_in_force(
-    archive: FolderArchive, obedient: Sequence[str]
-) -> None:
-    archive.store(result(3.0))
-    archive.folder.chmod(0o555)
-
-    assert "Permission is denied" in stored_elsewhere(archive, words=obedient)
-
-    archive.folder.chmod(0o755)
-    assert x_in_force(archive) == 1.0
-    assert stored_elsewhere(archive, words=obedient) == ""
-    assert x_in_force(archive) == 2.0
 
 
 def test_the_file_of_a_result_is_found_among_others_while_it_is_there(

@@ -14,7 +14,6 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.formats.observation_files import Centers
-from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
 from lightpen_extensions.measure.probing.sources import (
     ImageLocation,
@@ -30,10 +29,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
 )
-
-DOWN = np.array([0.0, 1.0, 0.0])
-LIMITS = VerificationLimits()
-
 
 TWO_IMAGES = ProbingRules(2, 1)
 

@@ -1,7 +1,6 @@
 """Verifications on the screen, line by line."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -35,7 +34,6 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
 )
 
-NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 RULE = rule_in_words(VerificationLimits())
 DOUBT = check(message("drift.too-few"), VERIFY_AGAIN)
 VERDICT = ["", f"Verdict      CHECK: {DOUBT.reason}", *(f"{'':13}{each}" for each in

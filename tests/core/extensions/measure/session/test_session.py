@@ -218,20 +218,6 @@ def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
     assert too_few.state.fault.code == "fixed-point.too-few"
 
 
-def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
-    session.choose(FIXED_POINT, n_cone=6)
-    instrument = session.setup.instrument
-    bent = instrument.tip_pen + np.array([0.3, 0.0, 0.0])
-    session.holder = Holder(instrument.rig, instrument.pen, bent)
-    session.touch(*leant(6))
-
-    found = found_by(session.state, FIXED_POINT)
-    assert found is not None
-    assert found.assessment.grade is Grade.REPEAT
-    assert found.assessment.reason.code == "tip.another"
-    np.testing.assert_allclose(found.tip.change, [0.3, 0.0, 0.0], atol=0.02)
-
-
 # A cone that stands still, as witness that the camera does
 
 

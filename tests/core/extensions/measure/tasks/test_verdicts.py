@@ -36,7 +36,6 @@ PASSED = "tip.with-power verification.use-tip pass"
 ANOTHER_TIP = "tip.another verification.calibrate-again repeat"
 DIFFERS = "tip.differs verification.calibrate-again check"
 WEAK_POWER = "tip.weak-power verification.more-points check"
-NO_POWER = "tip.no-power verification.more-points check"
 
 
 def said(found: VerificationAssessment | None) -> str:
