@@ -159,7 +159,7 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
 
     found = improve_pen(swings, paper_camera(), PEN_FILE, report=done.append)
 
-    assert done == [0.25, 0.5, 0.75, 1.0]
+    assert done == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
 
     def errors(leds: np.ndarray) -> np.ndarray:
         """Errors but for those of the frame, by the differences between LEDs."""
