@@ -141,6 +141,7 @@ class CheckList(QListWidget):
 
 
 LEAST_ROW, TALL_ROW, TALLEST_ROW = 3 * GRID, 5 * GRID, 7 * GRID  # px
+LIMIT_HEIGHT = 2 * GRID  # px, of a written limit
 NAME_SHARE, BAR_SHARE = 0.3, 0.33  # of the width; the rest is for the value
 MARGIN = 0.12  # of the range of limits and values
 WIDEST = 3.0  # times the limits, that are drawn
@@ -242,7 +243,7 @@ class BandChart(QWidget):
         """Write a limit below its line."""
         painter.save()
         painter.setFont(font(TextSize.SMALL))
-        below = QRectF(place.x() - 5 * GRID, place.y(), 10 * GRID, 2 * GRID)
+        below = QRectF(place.x() - 5 * GRID, place.y(), 10 * GRID, LIMIT_HEIGHT)
         center = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
         painter.drawText(below, center, f"{round(limit, MOST_DECIMALS):.7g}")
         painter.restore()
@@ -264,6 +265,9 @@ class BandChart(QWidget):
         room = MARGIN * (high - low)
         span = _Range(low - room, high + room)
         y, thick = box.center().y(), min(box.height() / 3, 1.5 * GRID)
+        if box.height() > TALL_ROW:  # the limits are written below
+            thick = min(thick, (box.height() - LIMIT_HEIGHT) / 2 - 2)
+            y = min(y, box.bottom() - thick - LIMIT_HEIGHT)
         within = min(limits) if len(limits) > 1 else 0.0, max(limits)
         zone = QRectF(span.at(within[0], box), y - thick, 0, 2 * thick)
         zone.setRight(span.at(within[1], box))

@@ -263,10 +263,10 @@ class Preparation:
         """Return a copy with other names.
 
         Ball diameter and nominal centre of the tip before are dropped, unless a
-        diameter comes with the new name.
+        diameter comes with the new name, or they were given before any name.
         """
         now = self.names
-        if names.tip == now.tip:
+        if now.tip in ("", names.tip):
             return replace(self, names=names)
         if names.ball_diameter == now.ball_diameter:
             names = replace(names, ball_diameter=None)

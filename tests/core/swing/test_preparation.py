@@ -290,6 +290,11 @@ def test_another_tip_forgets_ball_and_nominal_centre(prepared: Preparation) -> N
     given = before.renamed(replace(before.names, tip="T-2", ball_diameter=3.0))
     assert given.names.ball_diameter == 3.0
 
+    unnamed = replace(before, names=replace(before.names, tip="", ball_diameter=8.0))
+    first = unnamed.renamed(replace(unnamed.names, tip="T-2"))
+    assert first.names.ball_diameter == 8.0
+    assert first.nominal_tip is before.nominal_tip
+
 
 def test_the_temperature_of_the_pen_counts_for_the_day_on_which_it_is_stated(
     whole: Preparation,

@@ -60,6 +60,24 @@ def test_a_bar_ends_beyond_the_limit_only_if_the_value_is_beyond_it(
     assert chart.accessibleName() == f"hole {value_text(band)}"
 
 
+@pytest.mark.parametrize("height", [41, 45, 49, 56])
+def test_the_limits_below_the_last_bar_are_seen_whole(
+    qtbot: QtBot, height: int
+) -> None:
+    chart = BandChart()
+    qtbot.addWidget(chart)
+    chart.set_bands((Band("hole", 24.1, 0.01, 23.8, 24.2, 24.0, Decision.ACCEPTED),))
+    chart.resize(800, height)
+    image = chart.grab().toImage()
+
+    def is_blank(y: int) -> bool:
+        return len({image.pixel(x, y) for x in range(image.width())}) == 1
+
+    assert is_blank(0)
+    assert is_blank(image.height() - 1)
+    assert not is_blank(image.height() - 6)  # they are there
+
+
 def test_a_value_has_the_decimals_of_its_uncertainty() -> None:
     band = Band("hole", 24.00312, 0.0517)
 
