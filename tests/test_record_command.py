@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -73,17 +72,6 @@ def test_the_record_may_be_called_from_another_folder_or_with_a_slash(
 
     assert calibrated(Path())[0]["tip_pen_mm"] == tip
     assert calibrated(Path("images") / "..")[0]["tip_pen_mm"] == tip
-
-
-def test_a_swing_that_another_program_captures_can_be_calibrated(
-    calibrated: Calibrated,
-    untouched: dict[str, Any],
-    folder: Path,
-    holding: Callable[[Path], "subprocess.Popen[str]"],
-) -> None:
-    holding(folder)
-
-    assert calibrated(folder)[0]["tip_pen_mm"] == untouched["tip_pen_mm"]
 
 
 def test_the_files_of_the_record_are_named_with_their_hashes(

@@ -211,33 +211,6 @@ def test_a_verification_needs_images_or_led_centres(
     assert "--centers" in outcome.stderr
 
 
-@pytest.fixture
-def verify_with(
-    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
-) -> Callable[[dict[str, Any]], CompletedProcess[str]]:
-    """Return a function that verifies the fixed point with another record."""
-
-    def verify(record: dict[str, Any]) -> CompletedProcess[str]:
-        other = tmp_path / "other.json"
-        other.write_text(json.dumps(record), encoding="utf-8")
-        images = shared_data / "fixed-point"
-        return lightpen("verify", "fixed-point", images, *files[:-1], other)
-
-    return verify
-
-
-def test_a_result_that_was_changed_is_refused(
-    verify_with: Callable[[dict[str, Any]], CompletedProcess[str]], tip: Path
-) -> None:
-    record = read(tip)
-    record["tip_pen_mm"][0] += 0.1
-
-    outcome = verify_with(record)
-
-    assert outcome.returncode == 2
-    assert "was modified or damaged after it was written." in outcome.stderr
-
-
 def test_a_tip_of_another_pen_is_refused(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:

@@ -389,20 +389,6 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     assert after.tip_pen.tolist() == in_force.tip
 
 
-def test_an_accepted_swing_is_concluded_and_no_longer_offered(
-    solved: "Station",
-) -> None:
-    assert solved.interrupted() == [solved.record_folder]
-    solved.accept()
-    result = solved.status.result
-    assert result is not None
-
-    assert open_record(solved.record_folder).verdict == result.grade
-    assert Path(result.record) == solved.record_folder
-    assert result.names == solved.status.names
-    assert solved.interrupted() == []
-
-
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
     solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
