@@ -1,6 +1,7 @@
 """The application around the window: fonts, colours, language, sounds, crash hook."""
 
 import gc
+import locale
 import logging
 import os
 import signal
@@ -272,6 +273,8 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     application = QApplication([printable(argument) for argument in arguments])
     application.setApplicationName("lightpen")
     application.setApplicationDisplayName("Lightpen")
+    # Qt has set the locale; with Turkish letters PySide finds no property by keyword.
+    locale.setlocale(locale.LC_CTYPE, "C")
     GarbageCollector(application)
     return application
 
