@@ -19,6 +19,7 @@ from lightpen.model.names import Origin
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.preparation import SourceChoice
+from lightpen_app.look.words import on_one_line
 from lightpen_app.work.settings import FilePaths, Settings, Station, StoredCamera
 from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
 from lightpen_extensions.simulator.scene_files import write_sample_files
@@ -86,7 +87,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     walker.click_step("Camera")
     walker.until_tells("10 of 10 LEDs")
     assert walker.tells("Size fits: 1224 x 1024")
-    assert walker.tells("Incomplete: 0")
+    assert walker.tells(on_one_line("Incomplete: 0"))
     walker.click("Continue to the LEDs")
     walker.until(walker.main_button().isEnabled)
     walker.click("Continue to the swing")
