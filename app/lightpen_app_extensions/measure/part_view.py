@@ -1,11 +1,11 @@
-"""A part as it is probed, in space: points, features, deviations and the next point."""
+"""A part as it is probed, in space: points, features and deviations."""
 
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
 from PySide6.QtCore import QPointF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -25,10 +25,9 @@ from lightpen_extensions.measure.tasks.part import PART, feature_so_far, fit_of
 from lightpen_extensions.measure.tasks.task import Band
 
 MARGIN = 0.1  # of the sides
-DOT, TIP, GOAL = 3.0, 6.0, 9.0  # px, radii
+DOT, TIP = 3.0, 6.0  # px, radii
 MAGNIFIED = 200.0  # times a deviation is drawn
-TURN = 0.01  # rad a pixel of the mouse
-FROM_ABOVE = np.array([0.6, 0.0, 0.0])  # rotation vector of the first view
+FROM_ABOVE = rotation_from_vector(np.array([0.6, 0.0, 0.0]))  # of the view
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,6 @@ class PartValue:
     # (M, 3), what is drawn as large as fits; empty for all of it
     focus: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     tip: FloatArray | None = None  # (3,), at present
-    goal: FloatArray | None = None  # (3,), a next point, far from the others
 
 
 EMPTY = np.zeros((0, 3))
@@ -70,9 +68,7 @@ def part_value(setup: SessionSetup, state: SessionState) -> PartValue:
         offsets.append(np.zeros_like(shown[-1]) if fit is None else fit.offsets)
         lines += [] if fit is None else outline_of(of_centres(fit, shown[-1]))
     feature = feature_so_far(setup.choices, progress, setup.conditions)
-    next_touch = None if feature is None else feature.next_touch
-    goal = None if next_touch is None else next_touch.point
-    focus = [*shown[-1], *([] if goal is None else [goal])]
+    focus = list(shown[-1])
     if feature is not None and feature.fit is not None:
         focus += np.concatenate(outline_of(of_centres(feature.fit, shown[-1]))).tolist()
     return PartValue(
@@ -81,18 +77,15 @@ def part_value(setup: SessionSetup, state: SessionState) -> PartValue:
         tuple(lines),
         np.array(focus).reshape(-1, 3) if len(shown[-1]) > 1 else EMPTY,
         tip,
-        goal,
     )
 
 
 class PartView(Translated, QWidget):
-    """Draws a part in space; the mouse turns it."""
+    """Draws a part in space."""
 
     def __init__(self) -> None:
         super().__init__()
         self._value = NOTHING
-        self._turn = rotation_from_vector(FROM_ABOVE)
-        self._pressed: QPointF | None = None
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
         self._retranslate()
@@ -112,45 +105,26 @@ class PartView(Translated, QWidget):
         return QSize(24 * GRID, 24 * GRID)
 
     @override
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._pressed = event.position()
-
-    @override
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is None:
-            return
-        way, self._pressed = event.position() - self._pressed, event.position()
-        turn = rotation_from_vector(np.array([-way.y(), way.x(), 0.0]) * TURN)
-        self._turn = turn @ self._turn
-        self.update()
-
-    @override
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self._pressed = None
-
-    @override
     def paintEvent(self, event: QPaintEvent) -> None:
         value, colors = self._value, colors_of(self.palette())
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.rect(), QColor(colors.panel))
-        marks = [each for each in (value.tip, value.goal) if each is not None]
-        all_ = np.concatenate(
-            [value.points, *value.outlines, *(m[None] for m in marks)]
-        )
+        tip = EMPTY if value.tip is None else value.tip[None]
+        all_ = np.concatenate([value.points, *value.outlines, tip])
         if not len(all_):
             painter.setPen(QColor(colors.muted))
             place = Qt.AlignmentFlag.AlignCenter
             painter.drawText(self.rect(), place, self.tr("No points yet"))
             return
-        flat = (value.focus if len(value.focus) else all_) @ self._turn.T
+        flat = (value.focus if len(value.focus) else all_) @ FROM_ABOVE.T
         low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)
         room = np.array([self.width(), self.height()]) * (1 - 2 * MARGIN)
         scale = float((room / np.maximum(high - low, 1.0)).min())
         middle, center = (low + high) / 2, np.array([self.width(), self.height()]) / 2
 
         def seen(points: FloatArray) -> list[QPointF]:
-            places = ((points @ self._turn.T)[:, :2] - middle) * scale + center
+            places = ((points @ FROM_ABOVE.T)[:, :2] - middle) * scale + center
             return [QPointF(*place) for place in places.tolist()]
 
         painter.setPen(QPen(QColor(colors.accent), 1.5))
@@ -166,13 +140,9 @@ class PartView(Translated, QWidget):
         for dot in dots:
             painter.drawEllipse(dot, DOT, DOT)
         painter.setBrush(QColor(0, 0, 0, 0))
-        for mark, color, radius in (
-            (value.tip, colors.good, TIP),
-            (value.goal, colors.pointer, GOAL),
-        ):
-            if mark is not None:
-                painter.setPen(QPen(QColor(color), 3))
-                painter.drawEllipse(seen(mark[None])[0], radius, radius)
+        painter.setPen(QPen(QColor(colors.good), 3))
+        for mark in seen(tip):
+            painter.drawEllipse(mark, TIP, TIP)
 
     @override
     def _retranslate(self) -> None:
@@ -180,12 +150,8 @@ class PartView(Translated, QWidget):
         self.setAccessibleName(
             words.format(len(self._value.points), len(self._value.outlines))
         )
-        set_tooltip(
-            self,
-            self.tr(
-                "Deviations are drawn {0} times as large. Drag to turn the part."
-            ).format(round(MAGNIFIED)),
-        )
+        words = self.tr("Deviations are drawn {0} times as large.")
+        set_tooltip(self, words.format(round(MAGNIFIED)))
 
 
 PICTURE_HEIGHT = 18 * GRID  # px, at least
@@ -247,16 +213,11 @@ class FigurePanel(QWidget):
 
 def posture_value(setup: SessionSetup, state: SessionState) -> DialValue:
     """Return the postures of the pen at the points of a check, and the present one."""
-    points = [*chain.from_iterable(state.runs), *state.touches]
-    if state.found is not None:
-        points = list(state.found.probed)
-    pen = setup.instrument.pen
+    points, pen = chain(*state.runs, state.touches), setup.instrument.pen
     dial = dial_of(
         [posture_of(pen, point.rotation) for point in points],
         live_posture(setup, state),
     )
-    if state.done is not None:
-        return dial
     goal = setup.task.hand(setup.choices, len(state.runs), len(state.touches))
     return replace(dial, target=Posture(goal.tilt, goal.direction, 0.0))
 

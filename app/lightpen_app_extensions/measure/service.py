@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QObject, Signal
-from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
 from lightpen.archive.chains import Event
@@ -315,17 +314,13 @@ class ProbingSimulatorControls(SimulatorControls):
             checkable=True,
         )
         self._touch.setProperty("inviting", True)
-        lift, tip = self.tr("Lift"), self.tr("Take the tip away for a moment.")
-        self._lift = self.say(QToolButton(), lift, tip=tip)
 
         # Layout
         margins = (GRID, GRID // 2, GRID, GRID // 2)
-        cells = self._touch, 1, self._lift
-        horizontal_layout(self, *cells, spacing=2 * GRID, margins=margins)
+        horizontal_layout(self, self._touch, 1, margins=margins)
 
         # Connections
         self._touch.toggled.connect(service.set_touching)
-        self._lift.clicked.connect(self._on_lift_clicked)
 
         self._follow_connection()
 
@@ -338,6 +333,3 @@ class ProbingSimulatorControls(SimulatorControls):
         super()._follow_connection()
         if self._touch.isChecked():  # of a camera opened again
             self._service.set_touching(self._live.operator is not None)
-
-    def _on_lift_clicked(self) -> None:
-        self._command(lambda hand: hand.lift())

@@ -141,7 +141,6 @@ MESSAGES = {
     "part.more-points": "Probe more points, or use a precise probing, for a smaller U.",
     "part.complete": "Measure the missing features.",
     "part.csv": "CSV, a row for each characteristic",
-    "part.qdas": "Q-DAS (AQDEF), for statistics",
     "part.qif": "QIF 3.0 results",
     "measuring.no-format": "The suffix of {file} is no export format. Use one of {suffixes}.",
     "scene.no-folder": "{reason} The folder {folder} cannot be created or read.",

@@ -1,28 +1,12 @@
 """The simulated station: a plate with its plan, and an operator who probes it."""
 
-from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
-
-from lightpen.arrays import FloatArray
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import parse_plan
 from lightpen_extensions.measure.probing.probing import ProbingPhase
 from lightpen_extensions.measure.session import SessionSetup, SessionState, is_at_rest
-from lightpen_extensions.measure.tasks.registry import AnyTask
-from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
 from lightpen_extensions.simulator.hand import HandActivity, SimulatedOperator
-
-
-@dataclass(frozen=True)
-class _TouchGoal:
-    """A point that the operator was sent to."""
-
-    task: AnyTask | None
-    choices: VerificationChoices
-    run: int
-    step: int
 
 
 class ProbingOperator:
@@ -30,13 +14,14 @@ class ProbingOperator:
 
     def __init__(self, operator: SimulatedOperator) -> None:
         self._operator = operator
-        self._wanted: _TouchGoal | None = None
+        # Task, choices, run and step of the point that the operator was sent to
+        self._wanted: tuple[object, ...] | None = None
 
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
         """React to a state of the verification; reseat a lifted tip."""
         task, operator = state.task(setup), self._operator
-        n_runs = len(state.runs)
-        wanted = _TouchGoal(task, setup.choices, n_runs, len(state.touches))
+        run, step = len(state.runs), len(state.touches)
+        wanted = task, setup.choices, run, step
         is_lifted = operator.doing in (HandActivity.LIFTED, HandActivity.ABSENT)
         if wanted == self._wanted and not (is_lifted and task is not None):
             return
@@ -52,24 +37,17 @@ class ProbingOperator:
         if must_move_on and is_lifted:
             return
         before, self._wanted = self._wanted, wanted
-        goal = task.hand(setup.choices, len(state.runs), wanted.step)
+        goal = task.hand(setup.choices, run, step)
         if must_move_on:
             operator.lift()
         elif goal.point is not None:
-            ball = setup.conditions.ball_diameter or 0.0
-            operator.touch(_ball_on(goal, goal.point, ball))
+            radius = (setup.conditions.ball_diameter or 0.0) / 2
+            operator.touch(goal.point + radius * goal.outwards)
         else:
-            is_other = before is None or before.task is not task
+            is_other = before is None or before[0] is not task
             if is_lifted or is_same_again or is_other:
                 operator.seat()
             operator.lean_towards(goal.tilt, goal.direction, 0.0)
-
-
-def _ball_on(goal: HandGoal, point: FloatArray, ball_diameter: float) -> FloatArray:
-    """Return the target of the ball centre."""
-    if goal.outwards is None:
-        return point
-    return np.asarray(point + ball_diameter / 2 * goal.outwards)
 
 
 # The part of the simulated station: a plate of ten features, and its measuring plan.

@@ -3124,8 +3124,8 @@
         <translation>工件三维图：{0} 个点，{1} 条要素线</translation>
     </message>
     <message>
-        <source>Deviations are drawn {0} times as large. Drag to turn the part.</source>
-        <translation>偏差放大 {0} 倍显示。拖动可旋转工件。</translation>
+        <source>Deviations are drawn {0} times as large.</source>
+        <translation>偏差放大 {0} 倍显示。</translation>
     </message>
 </context>
 <context>
@@ -3430,16 +3430,8 @@ needed</source>
         <translation>自动触测所有任务。</translation>
     </message>
     <message>
-        <source>Lift</source>
-        <translation>抬起</translation>
-    </message>
-    <message>
         <source>Let the simulated operator probe</source>
         <translation>让模拟操作员触测</translation>
-    </message>
-    <message>
-        <source>Take the tip away for a moment.</source>
-        <translation>暂时移开测头。</translation>
     </message>
 </context>
 <context>
@@ -6008,10 +6000,6 @@ needed</source>
     <message>
         <source>Q-DAS (AQDEF)</source>
         <translation>Q-DAS (AQDEF)</translation>
-    </message>
-    <message>
-        <source>Q-DAS (AQDEF), for statistics</source>
-        <translation>Q-DAS (AQDEF)，用于统计</translation>
     </message>
     <message>
         <source>QIF 3.0 results</source>

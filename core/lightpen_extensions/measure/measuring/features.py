@@ -343,7 +343,7 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     origin, axes, sizes = _standard(kind, points, at)
     values, J, by_point = _jacobian(surface, points, (origin, axes, sizes))
     scale = np.linalg.norm(J, axis=0)
-    if not (scale > 0).all() or _condition(J / scale) > 1 / UNDETERMINED:
+    if not (scale > 0).all() or np.linalg.cond(J / scale) > 1 / UNDETERMINED:
         raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
     n, k, _ = by_point.shape
     G = np.zeros((n, k, n, 3))
@@ -370,11 +370,6 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     return Feature(
         kind, origin, axes, sizes, distances, by_points, by_distances, offsets
     )
-
-
-def _condition(J: FloatArray) -> float:
-    singular = np.linalg.svd(J, compute_uv=False)
-    return float(singular[0] / max(singular[-1], np.finfo(float).tiny))
 
 
 def _standard(kind: FeatureKind, points: FloatArray, at: Start) -> Start:

@@ -1,4 +1,4 @@
-"""The points of a part: those probed, and places to probe that lie far from them."""
+"""The points of a part: those probed, and places to probe by the nominals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen_extensions.measure.measuring.alignment import Quantity
-from lightpen_extensions.measure.measuring.features import Feature, frame_about
+from lightpen_extensions.measure.measuring.features import frame_about
 from lightpen_extensions.measure.measuring.plan import Nominal
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 
 N_ROUND, N_ALONG = 24, 5  # places round an axis and along it
 N_GRID = 7  # places along the sides of a plane
 INSIDE = 0.8  # of the extent: edges are not probed
-HALF_ANGLE = np.radians(70.0)  # of a sphere, about its accessible pole
+HALF_ANGLE = np.radians(70.0)  # of a sphere, about its pole
 USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
 
 
@@ -27,8 +27,6 @@ class ProbedArea:
     axes: FloatArray  # (3, 3)
     sizes: FloatArray  # (S,)
     half: FloatArray  # (3,), half of its extent along its axes, mm
-    # (3,), direction to the accessible side of a sphere, frame of the feature
-    pole: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,18 +35,6 @@ class Place:
 
     point: FloatArray
     normal: FloatArray
-
-
-def area_of(feature: Feature, points: FloatArray) -> ProbedArea:
-    """Return the area that points (N, 3) were probed on."""
-    q = (points - feature.origin) @ feature.axes
-    middle = q.mean(axis=0)
-    length = float(np.linalg.norm(middle))
-    pole = middle / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    half = np.maximum(np.abs(q).max(axis=0), 1e-9)
-    return ProbedArea(
-        feature.kind, feature.origin, feature.axes, feature.sizes, half, pole
-    )
 
 
 def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
@@ -71,7 +57,6 @@ def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
         _level_frame(z),
         np.array([named[name] for name in names]),
         INSIDE / 2 * np.array(half),
-        np.array([0.0, 0.0, 1.0]),
     )
 
 
@@ -86,18 +71,10 @@ def _level_frame(z: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def spread_places(
-    area: ProbedArea, n: int, touched: FloatArray | None = None
-) -> list[Place]:
-    """Return n places, each as far as can be from those before it.
-
-    ``touched`` (N, 3) are points that are probed already.
-    """
+def spread_places(area: ProbedArea, n: int) -> list[Place]:
+    """Return n places, each as far as can be from those before it."""
     places = _places(area)
     away = np.full(len(places), np.inf)
-    if touched is not None and len(touched):
-        own = (touched - area.origin) @ area.axes
-        away = np.linalg.norm(places[:, None] - own, axis=2).min(axis=1)
     found = []
     for _ in range(n):
         farthest = places[int(np.argmax(away))]
@@ -135,9 +112,7 @@ def _places(area: ProbedArea) -> FloatArray:
             caps = [
                 np.sin(t) * round_ + np.cos(t) * np.array([0.0, 0.0, 1.0]) for t in tilt
             ]
-            return np.asarray(
-                area.sizes[0] * np.concatenate(caps) @ frame_about(area.pole).T
-            )
+            return np.asarray(area.sizes[0] * np.concatenate(caps))
         case FeatureKind.CYLINDER | FeatureKind.CONE:
             slope = 0.0 if area.kind is FeatureKind.CYLINDER else np.tan(area.sizes[1])
             return np.concatenate(

@@ -10,7 +10,6 @@ from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.opened_files import InputFile, hashed
 from lightpen.messages import printable
-from lightpen.model.bending import ASSUMED_BENDING, Bending
 from lightpen.model.names import Origin
 from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
 from lightpen.record.results.result_folder import FolderArchive
@@ -39,7 +38,6 @@ class CurrentTip:
     pen_file: InputFile
     temperature_c: float | None = None  # of the pen on that day
     humidity_percent: float | None = None  # of the room on that day
-    bending: Bending = ASSUMED_BENDING
 
     @property
     def region(self) -> RegionOfInterest:
@@ -83,10 +81,9 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         )
     calibration = read_calibration(file)
     today = preparation.assumptions_today
-    bending = bending_of(calibration)
     instrument = instrument_of(
         *(calibration, viewers, pen_file.pen, pen_file.path),
-        *(today.temperature_c, bending),
+        *(today.temperature_c, bending_of(calibration)),
     )
     nominal_tip = preparation.nominal_tip
     for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
@@ -103,7 +100,6 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         pen_file=hashed(pen_file.path),
         temperature_c=today.temperature_c,
         humidity_percent=today.humidity_percent,
-        bending=bending,
     )
 
 

@@ -161,28 +161,11 @@ def judged_tip(
     distance = float(np.linalg.norm(change))
     if not found.is_significant or distance <= RELEVANT * limits.tip:
         return None
-    x, y, z = change.tolist()
+    figures = dict(zip("xyz", change.tolist(), strict=True))
+    figures |= {"distance": distance, "uncertainty": uncertainty, "limit": limits.tip}
     if limits.decision(distance, uncertainty, limits.tip) is Decision.REJECTED:
-        another = message(
-            "tip.another",
-            x=x,
-            y=y,
-            z=z,
-            distance=distance,
-            uncertainty=uncertainty,
-            limit=limits.tip,
-        )
-        return refused(another, CALIBRATE_AGAIN)
-    differs = message(
-        "tip.differs",
-        x=x,
-        y=y,
-        z=z,
-        distance=distance,
-        uncertainty=uncertainty,
-        limit=limits.tip,
-    )
-    return check(differs, CALIBRATE_AGAIN)
+        return refused(message("tip.another", **figures), CALIBRATE_AGAIN)
+    return check(message("tip.differs", **figures), CALIBRATE_AGAIN)
 
 
 def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
@@ -228,11 +211,6 @@ class FixedPoint(Found):
     expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
     half_range_uncertainty: FloatArray  # (3,): 95 % of the half ranges by noise, mm
     tip: TipEvidence
-
-    @property
-    def probed(self) -> tuple[ProbedPoint, ...]:
-        """Probed points whose postures are shown."""
-        return self.touches
 
 
 def measure_fixed_point(

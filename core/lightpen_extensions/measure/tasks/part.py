@@ -35,7 +35,6 @@ from lightpen_extensions.measure.measuring.features import Feature, fit_feature
 from lightpen_extensions.measure.measuring.next_touch import (
     PartTouches,
     Place,
-    area_of,
     nominal_area,
     spread_places,
 )
@@ -117,7 +116,6 @@ class FeatureSoFar:
     planned: PlannedFeature
     kind: FeatureKind | None  # as planned, or as recognised so far
     fit: Feature | None = None  # to the ball centres, once they determine it
-    next_touch: Place | None = None  # far from the others, frame of the camera
 
 
 def feature_so_far(
@@ -127,13 +125,9 @@ def feature_so_far(
     planned = planned_at(choices, len(progress.runs))
     if planned is None:
         return None
-    points = progress.points
-    kind, fit = fit_of(planned, points, conditions.instrument)
-    if fit is None:
-        return FeatureSoFar(planned, kind)
-    places = np.array([point.point_cam for point in points])
-    place = spread_places(area_of(fit, places), 1, places)[0]
-    return FeatureSoFar(planned, kind, fit, place)
+    return FeatureSoFar(
+        planned, *fit_of(planned, progress.points, conditions.instrument)
+    )
 
 
 @lru_cache(maxsize=N_KEPT)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Annotated, Any, Generic, Literal, TypeAlias, TypeVar
 
+import numpy as np
 from msgspec import Meta
 
 from lightpen.arrays import FloatArray
@@ -67,11 +68,6 @@ class Found:
 
     assessment: VerificationAssessment
 
-    @property
-    def probed(self) -> Points:
-        """Probed points whose postures are shown."""
-        return ()
-
 
 @dataclass(frozen=True, eq=False)
 class Band:
@@ -127,7 +123,7 @@ class HandGoal:
     point: FloatArray | None = None  # (3,), from the cone's bottom, mm
     tilt: float = 0.0  # of the pen in the cone, rad
     direction: float = 0.0  # of the tilt, rad
-    outwards: FloatArray | None = None  # (3,), normal of the surface there
+    outwards: FloatArray = field(default_factory=lambda: np.zeros(3))  # its normal
 
 
 FoundT = TypeVar("FoundT", bound=Found)

@@ -39,7 +39,6 @@ from lightpen_extensions.measure.session import (
 from lightpen_extensions.measure.tasks.part import (
     PART,
     Part,
-    feature_so_far,
     planned_places,
     touches_of_part,
 )
@@ -241,23 +240,6 @@ def test_a_feature_that_is_done_shows_its_results_at_once(
     assert all(each.decision for each in bands)
     at_it.probe(1)  # of the next feature
     assert bands_so_far(at_it.setup, at_it.state) == bands
-
-
-def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> None:
-    at_it = station(instrument, plate_plan())
-    at_it.probe(5)  # one short of the plane
-    progress = at_it.state.progress(at_it.setup, PART)
-
-    now = feature_so_far(at_it.setup.choices, progress, at_it.setup.conditions)
-
-    assert now is not None
-    assert now.kind is FeatureKind.PLANE
-    assert now.next_touch is not None
-    away = [
-        np.linalg.norm(point.point_cam - now.next_touch.point)
-        for point in progress.points
-    ]
-    assert min(away) > 9  # half a step of the grid of places
 
 
 def test_a_line_is_planned_from_left_to_right_at_the_front_of_the_part() -> None:
