@@ -111,12 +111,12 @@ def _deviations(pair: ReferencePair, found: Feature) -> dict[Quality, float]:
     if pair.kind is not FeatureKind.SPHERE:
         deviations[Quality.ORIENTATION] = turned
     if pair.kind is FeatureKind.CONE:
-        opens = float(np.sign(found.axis @ pair.axis)) * found.size("half_angle")
+        opens = float(np.sign(found.axis @ pair.axis)) * found.sizes[1]
         there = pair.size + along * tan(pair.half_angle)
-        deviations[Quality.SIZE] = abs(found.size("radius") - float(there))
+        deviations[Quality.SIZE] = abs(found.sizes[0] - float(there))
         deviations[Quality.ANGLE] = abs(opens - pair.half_angle)
     elif pair.kind is not FeatureKind.LINE:
-        deviations[Quality.SIZE] = abs(found.size("radius") - pair.size)
+        deviations[Quality.SIZE] = abs(found.sizes[0] - pair.size)
     return deviations
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from queue import SimpleQueue
 from threading import Event, Thread
 from time import monotonic
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 from lightpen.errors import Cancelled, LightpenError
 from lightpen.messages import Message
@@ -243,6 +243,39 @@ class StartThread(Protocol):
         on_progress: Report,
     ) -> Task:
         """Return the task; one of the three callables is queued when it ends."""
+
+
+class Workflow(Protocol):
+    """The response of a procedure to commands, on its own thread."""
+
+    def recover(self) -> None:
+        """Continue after an internal error."""
+
+    def shut_down(self) -> None:
+        """Write what is pending, and stop."""
+
+
+W = TypeVar("W", bound=Workflow)
+
+
+class WorkflowRunner(Generic[W]):
+    """Runs a workflow in its own thread; ``make`` takes how it starts others."""
+
+    def __init__(self, name: str, make: Callable[[StartThread], W]) -> None:
+        self._queue = SerialQueue(name, lambda: self._workflow.recover())
+        self._workflow = make(self._queue.start)
+
+    def ask(self, command: Callable[[W], None]) -> None:
+        """Queue a command: a call of the workflow."""
+        self._queue.ask(lambda: command(self._workflow))
+
+    def shut_down(self) -> None:
+        """Carry out all commands, shut the workflow down, and end."""
+        self._queue.end(lambda: self._workflow.shut_down())
+
+    def await_end(self, timeout_s: float) -> bool:
+        """Wait for the end after `shut_down`; return whether it came in time."""
+        return self._queue.await_end(timeout_s)
 
 
 class BackgroundTask:

@@ -77,8 +77,10 @@ class LanguageSwitch(QObject):
 CONTEXT = "core"
 
 
-def worded(message: Message | StoredMessage | None) -> str:
-    """Return the words of a message of the core; empty if there is none."""
+def worded(message: Message | StoredMessage | str | None) -> str:
+    """Return the words of a message of the core, or a name; empty if there is none."""
+    if isinstance(message, str):
+        return message
     if isinstance(message, StoredMessage):
         return message.worded(translated)
     return "" if message is None else message.text(translated)

@@ -3,24 +3,9 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from PySide6.QtCore import (
-    QModelIndex,
-    QPersistentModelIndex,
-    QPointF,
-    QRectF,
-    QSize,
-    Qt,
-    Signal,
-)
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import (
-    QFrame,
-    QListWidget,
-    QSizePolicy,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
-    QWidget,
-)
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QFrame, QListWidget, QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.languages import worded
@@ -28,10 +13,11 @@ from lightpen_app.look.phrases import DECISION_MARKS
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.look.words import decimals_for, number_text
+from lightpen_app.widgets.state_banner import StatusMessage, message_icon
 from lightpen_extensions.measure.tasks.task import Band
 
 ROW = Qt.ItemDataRole.UserRole  # a `CheckRow`
-WIDTH = 38 * GRID  # px
+WIDTH = 46 * GRID  # px
 QWIDGETSIZE_MAX = 16_777_215  # px, as PySide does not name it
 
 
@@ -52,48 +38,6 @@ class CheckRow:
         return f"{self.name}: {value}" if value else self.name
 
 
-class _Rows(QStyledItemDelegate):
-    """Draws the sign at the left, the name, and the value at the right."""
-
-    def __init__(self, place: QWidget) -> None:
-        super().__init__(place)
-        self._place = place
-
-    @override
-    def paint(
-        self,
-        painter: QPainter,
-        option: QStyleOptionViewItem,
-        index: QModelIndex | QPersistentModelIndex,
-    ) -> None:
-        row: CheckRow = index.data(ROW)
-        plain = QStyleOptionViewItem(option)
-        super().paint(painter, plain, index)
-        colors = colors_of(self._place.window().palette())  # its own is transparent
-        box = QRectF(option.rect)
-        sign = QRectF(box.left() + GRID, box.top(), 2 * GRID, box.height())
-        draw_sign(painter, sign, row.sign, colors.tone(row.tone))
-        words = box.adjusted(4 * GRID, 0, -GRID, 0)
-        metrics, middle = QFontMetricsF(option.font), Qt.AlignmentFlag.AlignVCenter
-        painter.save()
-        painter.setFont(option.font)
-        painter.setPen(colors.tone(row.tone if row.value else Tone.PLAIN))
-        painter.drawText(words, middle | Qt.AlignmentFlag.AlignRight, row.value)
-        words.setRight(words.right() - metrics.horizontalAdvance(row.value) - GRID)
-        quiet = Tone.QUIET if row.sign is Sign.RING else Tone.PLAIN
-        painter.setPen(colors.tone(quiet))
-        name = metrics.elidedText(row.name, Qt.TextElideMode.ElideRight, words.width())
-        painter.drawText(words, middle | Qt.AlignmentFlag.AlignLeft, name)
-        painter.restore()
-
-    @override
-    def initStyleOption(
-        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
-    ) -> None:
-        super().initStyleOption(option, index)
-        option.text = ""  # drawn above
-
-
 class CheckList(QListWidget):
     """Shows the checks; the row that is current is marked."""
 
@@ -102,10 +46,10 @@ class CheckList(QListWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("task_list")
-        self.setItemDelegate(_Rows(self))
+        self.setWordWrap(True)
+        self.setResizeMode(QListWidget.ResizeMode.Adjust)
         self.setSpacing(1)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setUniformItemSizes(True)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
         # Connections
@@ -125,10 +69,11 @@ class CheckList(QListWidget):
             self.addItem("")
         for i, row in enumerate(rows):
             item = self.item(i)
-            if item.data(ROW) != row:
-                item.setData(ROW, row)
-                item.setText(row.words)
-                item.setToolTip(row.words)
+            item.setData(ROW, row)
+            item.setText(row.words)
+            item.setToolTip(row.words)
+            sign = StatusMessage("", row.sign, row.tone)
+            item.setIcon(message_icon(sign, self.window()))
         self.blockSignals(False)
 
     def show_row(self, index: int) -> None:
@@ -173,11 +118,6 @@ def value_with_unit(band: Band) -> str:
     return value_text(band) + (degrees if band.is_angle else " mm")
 
 
-def band_name(band: Band) -> str:
-    """Return what a value is of."""
-    return band.name if isinstance(band.name, str) else worded(band.name)
-
-
 class BandChart(QWidget):
     """Draws values between their limits."""
 
@@ -191,7 +131,7 @@ class BandChart(QWidget):
         if bands == self._bands:
             return
         self._bands = bands
-        words = (f"{band_name(each)} {value_text(each)}" for each in bands)
+        words = (f"{worded(each.name)} {value_text(each)}" for each in bands)
         self.setAccessibleName("; ".join(words))
         self.setVisible(bool(bands))
         self.updateGeometry()
@@ -226,7 +166,7 @@ class BandChart(QWidget):
         name.setWidth(NAME_SHARE * box.width())
         painter.setPen(QColor(colors.text))
         words = painter.fontMetrics().elidedText(
-            band_name(band), Qt.TextElideMode.ElideRight, round(name.width())
+            worded(band.name), Qt.TextElideMode.ElideRight, round(name.width())
         )
         painter.drawText(name, left | middle, words)
         bar = QRectF(name.right() + GRID, box.top(), 0, box.height())

@@ -16,7 +16,7 @@ from lightpen_app.look.words import PARTED, number_text
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import State
-from lightpen_app_extensions.measure.check_list import CheckRow, band_name, value_text
+from lightpen_app_extensions.measure.check_list import CheckRow, value_text
 from lightpen_app_extensions.measure.part_view import FigureValue, part_value
 from lightpen_app_extensions.measure.plan_panel import PlanPanel
 from lightpen_app_extensions.measure.presenter import VerifyPresenter, VerifyView
@@ -172,7 +172,7 @@ class MeasurePresenter(VerifyPresenter):
             if choices.plan is None:
                 value = replace(value, count="", fraction=None)
             ended = bands_so_far(status.setup, status.state)[-1:]
-            words = (f"{band_name(e)}  {value_text(e)}" for e in ended)
+            words = (f"{worded(e.name)}  {value_text(e)}" for e in ended)
             value = replace(value, time_left="".join(words))
         return value
 
@@ -210,9 +210,8 @@ class MeasurePresenter(VerifyPresenter):
 
 
 def _value_row(band: Band) -> CheckRow:
-    verdict, mark = DECISIONS[band.decision], DECISION_MARKS[band.decision]
-    words = verdict if isinstance(verdict, str) else worded(verdict)
-    return CheckRow(band_name(band), value_text(band), *mark, words)
+    verdict, mark = worded(DECISIONS[band.decision]), DECISION_MARKS[band.decision]
+    return CheckRow(worded(band.name), value_text(band), *mark, verdict)
 
 
 class MeasurePage(ProbingPage):

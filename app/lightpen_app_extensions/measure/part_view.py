@@ -13,7 +13,6 @@ from lightpen.arrays import FloatArray
 from lightpen.model.rigid import Posture, posture_of, rotation_from_vector
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, colors_of
-from lightpen_app.look.words import set_tooltip
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import FittedText
@@ -88,6 +87,8 @@ class PartView(Translated, QWidget):
         self._value = NOTHING
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
+        words = self.tr("Deviations are drawn {0} times as large.")
+        self.say(self, tip=words.format(round(MAGNIFIED)))
         self._retranslate()
 
     def set_value(self, value: PartValue) -> None:
@@ -150,8 +151,6 @@ class PartView(Translated, QWidget):
         self.setAccessibleName(
             words.format(len(self._value.points), len(self._value.outlines))
         )
-        words = self.tr("Deviations are drawn {0} times as large.")
-        set_tooltip(self, words.format(round(MAGNIFIED)))
 
 
 PICTURE_HEIGHT = 18 * GRID  # px, at least

@@ -158,7 +158,6 @@ class VerifyPresenter(QObject):
         setup, state, task = status.setup, status.state, status.task
         if setup is None or state is None or task is None:
             return OperatorValue(instruction.short, instruction.hint, banner)
-        shown = task.shows_postures
         return OperatorValue(
             instruction=instruction.short,
             hint=instruction.hint,
@@ -170,7 +169,7 @@ class VerifyPresenter(QObject):
                 if status.is_paused
                 else self.tr("Space: pause")
             ),
-            dial=posture_value(setup, state) if shown else None,
+            dial=posture_value(setup, state) if task.is_of_tip else None,
         )
 
     @property

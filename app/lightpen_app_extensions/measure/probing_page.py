@@ -76,6 +76,9 @@ class ProbingPage(ResponsiveLayout, Page):
         self._tabs = QTabWidget()
         for tab in (self._figure, self._details, self._image):
             self._tabs.addTab(tab, "")
+        texts = self.tr("Figure"), self.tr("Details"), self.tr("Live image")
+        self.say_items(self._tabs, (*texts, self.tr("List")))
+        self.say(self._checks, self.tr("Checks and features"))
         self._stack = QStackedWidget()
         self._stack.addWidget(self._tabs)
         self._simulator = ProbingSimulatorControls(service)
@@ -180,15 +183,6 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def _retranslate(self) -> None:
         self._image.set_message(self.tr("No image yet"))
-        names = {
-            self._figure: self.tr("Figure"),
-            self._details: self.tr("Details"),
-            self._image: self.tr("Live image"),
-            self._checks: self.tr("List"),
-        }
-        for tab, name in names.items():
-            self._tabs.setTabText(self._tabs.indexOf(tab), name)
-        self._checks.setAccessibleName(self.tr("Checks and features"))
         self._show()
 
     @override

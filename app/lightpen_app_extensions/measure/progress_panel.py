@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.messages import Message
 from lightpen.record.library.supervision import Signature
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import (
@@ -67,7 +66,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 
         # Widgets
         self._question = QuestionBar()
-        self._question.set_words(self._starting_over)
+        self._question.setworded(self._starting_over)
         self._reason = ReasonBar()
         self._instruction = FittedText(TextSize.TITLE)
         self._instruction.setMinimumHeight(4 * GRID)
@@ -159,7 +158,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._reason.set_words(
+        self._reason.setworded(
             self.tr(
                 "This result needs checking. Enter the reason for using the tip. It is "
                 "kept with the verification."
@@ -281,17 +280,13 @@ class DetailsView(PageScroll):
 def figures_of(table: ResultTable) -> Figures:
     """Return a table with its words in the language that is chosen."""
     return Figures(
-        tuple(map(_words, table.columns)) if table.rows else (),
-        tuple(_words(row.name) for row in table.rows),
+        tuple(map(worded, table.columns)) if table.rows else (),
+        tuple(worded(row.name) for row in table.rows),
         tuple(
             (
                 *row.texts(),
-                *([_words(row.remark)] if len(row.values) < len(table.columns) else ()),
+                *([worded(row.remark)] if len(row.values) < len(table.columns) else ()),
             )
             for row in table.rows
         ),
     )
-
-
-def _words(name: Message | str) -> str:
-    return name if isinstance(name, str) else worded(name)

@@ -82,13 +82,9 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
         self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
     ) -> None:
         """Forward the newest status and every event, on a thread of the runner."""
-        probing_operator, setup, state = (
-            self.probing_operator,
-            status.setup,
-            status.state,
-        )
-        if probing_operator is not None and setup is not None and state is not None:
-            probing_operator.follow(setup, state)
+        operator, setup, state = self.probing_operator, status.setup, status.state
+        if operator is not None and setup is not None and state is not None:
+            operator.follow(setup, state)
         self.post(status, events)
 
     @override

@@ -15,13 +15,13 @@ from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.local_time import local_now
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.runners import SerialQueue
+from lightpen.runners import WorkflowRunner
 from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.status import SwingListener, SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 
 
-class SwingRunner:
+class SwingRunner(WorkflowRunner[SwingWorkflow]):
     """Captures, solves and accepts one swing after another.
 
     Every method returns at once, except `process_image` and `await_end`. A command that
@@ -36,27 +36,17 @@ class SwingRunner:
         now: Callable[[], datetime] = local_now,
         logbook: LazyLogbook | None = None,
     ) -> None:
-        self._queue = SerialQueue("swing", lambda: self._workflow.recover())
-        self._workflow = SwingWorkflow(
-            records, archive, listener, now, self._queue.start, logbook
+        super().__init__(
+            "swing",
+            lambda start: SwingWorkflow(
+                records, archive, listener, now, start, logbook
+            ),
         )
 
     @property
     def status(self) -> SwingStatus:
         """The last published status; thread-safe."""
         return self._workflow.status
-
-    def ask(self, command: Callable[[SwingWorkflow], None]) -> None:
-        """Queue a command: a call of the workflow."""
-        self._queue.ask(lambda: command(self._workflow))
-
-    def shut_down(self) -> None:
-        """Finish pending commands, leave the swing to be resumed, and end."""
-        self._queue.end(lambda: self._workflow.shut_down())
-
-    def await_end(self, timeout_s: float) -> bool:
-        """Wait for the end after `shut_down`; return whether it came in time."""
-        return self._queue.await_end(timeout_s)
 
     def process_image(
         self,

@@ -149,7 +149,7 @@ def bands_so_far(setup: SessionSetup, state: SessionState) -> tuple[Band, ...]:
     if state.found is not None:
         return tuple(task.bands(state.found, setup.conditions))
     runs = state.runs
-    if task.judges_points and state.touches:
+    if task.is_of_tip and state.touches:
         runs = (*runs, state.touches)
     return _bands_of(setup.choices, setup.conditions, runs) if runs else ()
 

@@ -33,8 +33,8 @@ from lightpen.runners import (
     BackgroundTask,
     FaultReporter,
     Report,
-    SerialQueue,
     StartThread,
+    WorkflowRunner,
 )
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.swing_recorder import record_header
@@ -452,7 +452,7 @@ class VerificationWorkflow:
         self._listener.on_verification(status, events)
 
 
-class VerificationRunner:
+class VerificationRunner(WorkflowRunner[VerificationWorkflow]):
     """Verifies the current tip, by live images and by recorded ones.
 
     Every method returns at once, but for `take` and `await_end`. A command that
@@ -467,9 +467,8 @@ class VerificationRunner:
         listener: VerificationListener,
         now: Callable[[], datetime] = local_now,
     ) -> None:
-        self._queue = SerialQueue("verification", lambda: self._workflow.recover())
-        self._workflow = VerificationWorkflow(
-            archive, data, listener, now, self._queue.start
+        super().__init__(
+            "verification", partial(VerificationWorkflow, archive, data, listener, now)
         )
 
     @property
@@ -493,18 +492,6 @@ class VerificationRunner:
         """The task that takes images."""
         status = self.status
         return status.task if status.is_touching else None
-
-    def ask(self, command: Callable[[VerificationWorkflow], None]) -> None:
-        """Queue a command: a call of the workflow."""
-        self._queue.ask(lambda: command(self._workflow))
-
-    def shut_down(self) -> None:
-        """Carry out all commands, write the results, and end."""
-        self._queue.end(lambda: self._workflow.shut_down())
-
-    def await_end(self, timeout_s: float) -> bool:
-        """Wait for the end after `shut_down` and return whether it came."""
-        return self._queue.await_end(timeout_s)
 
     def take(
         self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest

@@ -57,9 +57,13 @@ Start = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def frame_about(axis: FloatArray) -> FloatArray:
-    """Return right-handed axes (..., 3, 3) as columns, z along vectors (..., 3)."""
+    """Return right-handed axes (..., 3, 3) as columns, z along vectors (..., 3).
+
+    The first is as near as can be to the axis that lies most across.
+    """
     z = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z), axis=-1)], z)
+    x = np.eye(3)[np.argmin(np.abs(z), axis=-1)]
+    x = x - np.sum(x * z, axis=-1, keepdims=True) * z
     x /= np.linalg.norm(x, axis=-1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
@@ -255,10 +259,6 @@ class Feature:
         q = (point - self.origin) @ self.axes
         off = SURFACES[self.kind].distances(q[None], self.sizes).values[0]
         return float(off[0] if len(off) == 1 else np.linalg.norm(off))
-
-    def size(self, name: str) -> float:
-        """Return a size by its name."""
-        return float(self.sizes[SURFACES[self.kind].sizes.index(name)])
 
 
 def fit_feature(kind: FeatureKind, points: FloatArray) -> Feature:

@@ -54,21 +54,10 @@ def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
     return ProbedArea(
         kind,
         np.array(nominal.origin),
-        _level_frame(z),
+        frame_about(z),
         np.array([named[name] for name in names]),
         INSIDE / 2 * np.array(half),
     )
-
-
-def _level_frame(z: FloatArray) -> FloatArray:
-    """Return axes about z with x as close to the x axis of the part as possible."""
-    z = z / np.linalg.norm(z)
-    along = np.array([1.0, 0.0, 0.0])
-    x = along - (along @ z) * z
-    if np.linalg.norm(x) < 0.1:
-        return frame_about(z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
 def spread_places(area: ProbedArea, n: int) -> list[Place]:
@@ -85,10 +74,7 @@ def spread_places(area: ProbedArea, n: int) -> list[Place]:
 
 def _place(area: ProbedArea, q: FloatArray) -> Place:
     gradient = SURFACES[area.kind].distances(q[None], area.sizes).by_point[0]
-    normal = gradient[0] if area.kind is not FeatureKind.POINT else gradient[2]
-    if area.kind is FeatureKind.LINE:
-        normal = np.array([0.0, 0.0, 0.0])
-    return Place(area.origin + area.axes @ q, area.axes @ normal)
+    return Place(area.origin + area.axes @ q, area.axes @ gradient[0])
 
 
 def _places(area: ProbedArea) -> FloatArray:

@@ -78,10 +78,9 @@ def _is_plausible(
         if is_face or (not known.size and len(points) < SURE):
             return False
     if fit.kind is FeatureKind.CONE:
-        half = fit.size("half_angle")
-        return bool(SHARPEST < half < FLATTEST)
+        return bool(SHARPEST < fit.sizes[1] < FLATTEST)
     if not len(fit.sizes):
         return True
-    radius = fit.size("radius")
+    radius = float(fit.sizes[0])
     is_bent = extent**2 / (8 * radius) > limit  # the sagitta shows
     return is_bent and radius < LARGEST * extent

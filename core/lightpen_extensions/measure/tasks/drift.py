@@ -227,5 +227,4 @@ DRIFT = VerificationTask(
     instruction=_instruction,
     screen=_screen,
     newness=(0.0, 0.0),
-    shows_postures=True,
 )

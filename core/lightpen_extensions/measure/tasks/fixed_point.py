@@ -161,11 +161,28 @@ def judged_tip(
     distance = float(np.linalg.norm(change))
     if not found.is_significant or distance <= RELEVANT * limits.tip:
         return None
-    figures = dict(zip("xyz", change.tolist(), strict=True))
-    figures |= {"distance": distance, "uncertainty": uncertainty, "limit": limits.tip}
+    x, y, z = change.tolist()
     if limits.decision(distance, uncertainty, limits.tip) is Decision.REJECTED:
-        return refused(message("tip.another", **figures), CALIBRATE_AGAIN)
-    return check(message("tip.differs", **figures), CALIBRATE_AGAIN)
+        another = message(
+            "tip.another",
+            x=x,
+            y=y,
+            z=z,
+            distance=distance,
+            uncertainty=uncertainty,
+            limit=limits.tip,
+        )
+        return refused(another, CALIBRATE_AGAIN)
+    differs = message(
+        "tip.differs",
+        x=x,
+        y=y,
+        z=z,
+        distance=distance,
+        uncertainty=uncertainty,
+        limit=limits.tip,
+    )
+    return check(differs, CALIBRATE_AGAIN)
 
 
 def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
@@ -476,5 +493,4 @@ FIXED_POINT = VerificationTask(
     instruction=lambda choices, progress: message("session.touch-cone"),
     screen=lambda progress: without_others(progress.points),
     newness=(NEW_POSTURE, ANY),
-    shows_postures=True,
 )

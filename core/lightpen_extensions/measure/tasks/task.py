@@ -165,8 +165,7 @@ class VerificationTask(Generic[FoundT]):
     missing: Callable[[VerificationChoices, float | None], Message | None] = _nothing
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, VerificationChoices], object] | None = None
-    judges_points: bool = True  # whether values are shown amid a run
-    shows_postures: bool = False  # whether the window shows how the pen was held
+    is_of_tip: bool = True  # values are shown amid a run, and how the pen was held
 
     def __str__(self) -> str:
         return self.kind
