@@ -141,12 +141,12 @@ class MeasurePresenter(VerifyPresenter):
         return status.tip is not None and status.refusal is not None
 
     @override
-    def _action(self) -> MainAction:
+    def action(self) -> MainAction:
         if self.lacks_plan():
             return MainAction(self.tr("Open a plan..."))
         if self._status.is_done:
             return MainAction(self.tr("Measure the next part"))
-        return super()._action()
+        return super().action()
 
     @override
     def _now(self) -> tuple[Instruction, State]:
@@ -177,9 +177,9 @@ class MeasurePresenter(VerifyPresenter):
         return value
 
     @override
-    def _lead(self) -> str:
+    def lead(self) -> str:
         plan = self._service.choices.plan
-        lead = super()._lead()
+        lead = super().lead()
         return lead if plan is None else PARTED.join((lead, worded(plan.words)))
 
     @override

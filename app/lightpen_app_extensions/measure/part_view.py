@@ -89,12 +89,12 @@ class PartView(Translated, QWidget):
         self.setSizePolicy(policy, policy)
         words = self.tr("Deviations are drawn {0} times as large.")
         self.say(self, tip=words.format(round(MAGNIFIED)))
-        self._retranslate()
 
     def set_value(self, value: PartValue) -> None:
         """Draw another state."""
         self._value = value
-        self._retranslate()
+        words = self.tr("The part in space: {0} points, {1} lines of features")
+        self.setAccessibleName(words.format(len(value.points), len(value.outlines)))
         self.update()
 
     @override
@@ -144,13 +144,6 @@ class PartView(Translated, QWidget):
         painter.setPen(QPen(QColor(colors.good), 3))
         for mark in seen(tip):
             painter.drawEllipse(mark, TIP, TIP)
-
-    @override
-    def _retranslate(self) -> None:
-        words = self.tr("The part in space: {0} points, {1} lines of features")
-        self.setAccessibleName(
-            words.format(len(self._value.points), len(self._value.outlines))
-        )
 
 
 PICTURE_HEIGHT = 18 * GRID  # px, at least

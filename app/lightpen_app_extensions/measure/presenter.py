@@ -37,22 +37,10 @@ from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
 from lightpen_extensions.measure.tasks.task import Band, rule_of
 
 
-@dataclass(frozen=True)
-class Headline:
-    """Status of the page for the window."""
-
-    lead: str = ""  # below its title
-    tone: Tone = Tone.QUIET
-    action: MainAction = field(default_factory=lambda: MainAction(""))
-    is_complete: bool = False
-    is_doubtful: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class VerifyView:
     """Content of the page of a verification, except the results."""
 
-    headline: Headline = field(default_factory=Headline)
     operator: OperatorValue = field(default_factory=OperatorValue)
     rows: tuple[CheckRow, ...] = ()  # checks, or features of a part
     current: int = 0  # row of what is probed now
@@ -89,9 +77,7 @@ class VerifyPresenter(QObject):
     def view(self) -> VerifyView:
         """Return the view."""
         status = self._status
-        headline = self.headline()
         return VerifyView(
-            headline=headline,
             operator=self.operator_value(),
             rows=self.rows(),
             current=self.current_row(),
@@ -101,7 +87,7 @@ class VerifyPresenter(QObject):
                 if status.is_paused
                 else self.tr("Pause (Space)")
             ),
-            can_be_accepted=headline.is_doubtful
+            can_be_accepted=self.is_doubtful()
             and status.is_done
             and not status.accepted_by,
             has_report=status.is_done and bool(status.files),
@@ -109,17 +95,10 @@ class VerifyPresenter(QObject):
             can_undo=status.state is not None and bool(status.state.touches),
         )
 
-    def headline(self) -> Headline:
-        """Return the status of the page."""
-        status, found = self._status, self._status.assessment
-        is_doubted = self._tip_is_doubted()
-        return Headline(
-            lead=self._lead(),
-            tone=Tone.WARN if is_doubted else Tone.QUIET,
-            action=self._action(),
-            is_complete=status.is_done,
-            is_doubtful=found is not None and not found.is_accepted,
-        )
+    def is_doubtful(self) -> bool:
+        """Return whether something was found against the tip."""
+        found = self._status.assessment
+        return found is not None and not found.is_accepted
 
     def next_step(self) -> str:
         """Return the key of the step after this one; empty for another check."""
@@ -178,7 +157,8 @@ class VerifyPresenter(QObject):
 
     # State of the page
 
-    def _lead(self) -> str:
+    def lead(self) -> str:
+        """Return the line below the title: the tip, its status and files."""
         status = self._status
         if status.tip is None:
             return self._purpose()
@@ -193,7 +173,7 @@ class VerifyPresenter(QObject):
             shortened(tip.names.pen),
             moment_text(tip.calibration.when),
         )
-        doubt = grade_text(Grade.CHECK) if self._tip_is_doubted() else ""
+        doubt = grade_text(Grade.CHECK) if self.tip_is_doubted() else ""
         files = ", ".join(file.name for file in status.files)
         kept = self.tr("saved as {0}").format(files) if files else ""
         by = shortened(status.accepted_by) if status.accepted_by else ""
@@ -204,7 +184,7 @@ class VerifyPresenter(QObject):
     def _purpose(self) -> str:
         return self.tr("Verify the current tip on reference artefacts.")
 
-    def _tip_is_doubted(self) -> bool:
+    def tip_is_doubted(self) -> bool:
         """Return whether the tip was accepted though its grade is CHECK."""
         tip = self._status.tip
         return tip is not None and tip.calibration.grade == Grade.CHECK
@@ -220,7 +200,8 @@ class VerifyPresenter(QObject):
         status = statuses.of_tip(tip.names.pen, tip.names.tip)
         return "" if status in (None, TipStatus.VALID) else status_text(status)
 
-    def _action(self) -> MainAction:
+    def action(self) -> MainAction:
+        """Return the main action of the page."""
         status = self._status
         if status.is_done:
             words = {

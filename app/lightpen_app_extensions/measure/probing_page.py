@@ -66,6 +66,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._runner = self._run.runner
         self._presenter = presenter
         self._view = VerifyView()
+        self._head: tuple[object, ...] = ()  # of the page, when it was last shown
         self._room = NO_ROOM
 
         # Widgets
@@ -107,19 +108,19 @@ class ProbingPage(ResponsiveLayout, Page):
 
     @override
     def lead(self) -> str:
-        return self._presenter.headline().lead
+        return self._presenter.lead()
 
     @override
     def lead_tone(self) -> Tone:
-        return self._presenter.headline().tone
+        return Tone.WARN if self._presenter.tip_is_doubted() else Tone.QUIET
 
     @override
     def is_complete(self) -> bool:
-        return self._presenter.headline().is_complete
+        return self._run.status.is_done
 
     @override
     def is_doubtful(self) -> bool:
-        return self._presenter.headline().is_doubtful
+        return self._presenter.is_doubtful()
 
     @override
     def why_closed(self) -> str:
@@ -128,7 +129,7 @@ class ProbingPage(ResponsiveLayout, Page):
 
     @override
     def main_action(self) -> MainAction:
-        return self._presenter.headline().action
+        return self._presenter.action()
 
     @override
     def run_main_action(self) -> None:
@@ -202,8 +203,8 @@ class ProbingPage(ResponsiveLayout, Page):
             self._showing.start()
 
     def _show(self) -> None:
-        before, self._view = self._view, self._presenter.view()
-        view, status = self._view, self._run.status
+        self._view = view = self._presenter.view()
+        status = self._run.status
         self._progress.set_value(view)
         self._checks.set_rows(view.rows)
         self._checks.show_row(self._shown_row())
@@ -212,7 +213,9 @@ class ProbingPage(ResponsiveLayout, Page):
             self._details.set_value(status.setup, status.state)
         if self.isVisible():
             self.operator_value_changed.emit(view.operator)
-        if view.headline != before.headline:
+        head = self.lead(), self.lead_tone(), self.main_action(), self.is_complete()
+        if head != self._head:
+            self._head = head
             self.changed.emit()
 
     def _shown_row(self) -> int:

@@ -21,12 +21,7 @@ from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.bars import Question, QuestionBar, ReasonBar, usual_reasons
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.fitting import (
-    NO_ROOM,
-    FittedText,
-    PageScroll,
-    ResponsiveLayout,
-)
+from lightpen_app.widgets.fitting import FittedText, PageScroll
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.workbench import Workbench
@@ -36,37 +31,20 @@ from lightpen_extensions.measure.measuring.report import ResultTable, points_tab
 from lightpen_extensions.measure.session import SessionSetup, SessionState
 
 PROGRESS_STEPS = 1000
-STATE_HEIGHT = 9 * GRID  # px, at least
-# Row, column, and how many of these each takes; the state is beside the instruction, or
-# below it where there is little width.
-PLACES = {
-    "_instruction": (0, 0),
-    "_hint": (1, 0),
-    "_buttons": (2, 0),
-    "_state": (0, 1, 3, 1),
-}
-NARROW_PLACES = {
-    "_instruction": (0, 0),
-    "_buttons": (0, 1),
-    "_hint": (1, 0, 1, 2),
-    "_state": (2, 0, 1, 2),
-}
+STATE_HEIGHT = 7 * GRID  # px, at least
 
 
-class ProgressPanel(ResponsiveLayout, Translated, QWidget):
+class ProgressPanel(Translated, QWidget):
     """Shows instruction, state and progress of a verification in one row."""
-
-    narrow_below = 100 * GRID  # px; then the instruction stands above
 
     def __init__(self, workbench: Workbench, run: VerificationRun) -> None:
         super().__init__()
         self._workbench, self._run = workbench, run
         self._runner = self._run.runner
-        self._room = NO_ROOM
 
         # Widgets
         self._question = QuestionBar()
-        self._question.setworded(self._starting_over)
+        self._question.set_words(self._starting_over)
         self._reason = ReasonBar()
         self._instruction = FittedText(TextSize.TITLE)
         self._instruction.setMinimumHeight(4 * GRID)
@@ -94,7 +72,12 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
-        self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
+        rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
+        rows.addWidget(self._instruction, 0, 0)
+        rows.addWidget(self._buttons, 0, 1)
+        rows.addWidget(self._hint, 1, 0, 1, 2)
+        rows.addWidget(self._state, 2, 0, 1, 2)
+        rows.setColumnStretch(0, 1)
         horizontal_layout(
             self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
@@ -102,7 +85,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
         self._row = horizontal_layout(self._buttons, *buttons, 1)
-        self._use_room()
 
         # Connections
         self._run.refused.connect(self._on_refused)
@@ -147,18 +129,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._question.hide()
 
     @override
-    def _use_room(self) -> None:
-        is_narrow = self._room.is_narrow
-        for widget, place in (NARROW_PLACES if is_narrow else PLACES).items():
-            child = getattr(self, widget)
-            self._rows.removeWidget(child)
-            self._rows.addWidget(child, *place)
-        self._rows.setColumnStretch(0, 1)
-        self._rows.setColumnStretch(1, 0 if is_narrow else 1)
-
-    @override
     def _retranslate(self) -> None:
-        self._reason.setworded(
+        self._reason.set_words(
             self.tr(
                 "This result needs checking. Enter the reason for using the tip. It is "
                 "kept with the verification."
@@ -217,13 +189,11 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 MOST_TABLES = 3  # of a task
 
 
-class FiguresView(Translated, QWidget):
+class FiguresView(QWidget):
     """A table of figures below its title, and sentences below it."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._value: ResultTable | None = None
-
         # Widgets
         self._head = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = NumberTable()
@@ -233,16 +203,8 @@ class FiguresView(Translated, QWidget):
         # Layout
         vertical_layout(self, self._head, self._table, self._notes, spacing=GRID // 2)
 
-        self._retranslate()
-
     def set_value(self, value: ResultTable | None) -> None:
-        """Show another table, or none."""
-        self._value = value
-        self._retranslate()
-
-    @override
-    def _retranslate(self) -> None:
-        value = self._value
+        """Show another table, or none, in the present language."""
         self.setVisible(value is not None)
         if value is None:
             return

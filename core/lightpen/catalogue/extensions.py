@@ -276,7 +276,6 @@ MESSAGES = {
     "drift.moved": "The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.",
     "drift.uncertain": "The drift reference stays within {distance:.4f} mm, but its U is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a drift of that size would not be detected.",
     "tip.another": "The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Was the tip replaced, bent or refitted, or is it that of another pen?",
-    "tip.differs": "The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The difference is significant.",
     "tip.with-power": "{reason} {power}",
     "tip.verified": "Verifies the tip: had it an error of {detectable:.4f} mm or more, this verification would show it (probability 95 %).",
     "tip.weak-power": "Does not verify the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.",

@@ -381,10 +381,8 @@ class VerificationWorkflow:
         self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here, refusal=why))
 
-    def _why_not(self, tip: CurrentTip | None) -> Message | None:
+    def _why_not(self, tip: CurrentTip) -> Message | None:
         """Return why the selection cannot be verified."""
-        if tip is None:
-            return self._status.refusal
         task = task_of(self._choices.kind)
         return task.missing(self._choices, tip.names.ball_diameter)
 

@@ -6938,10 +6938,6 @@ needed</source>
         <translation>摆动不充分：测头 U 为 {U:.2g} mm，焦距不确定度为 {focal:.2g} %，光笔倾斜变化 {tilt:.0f} 度。请向各方向倾斜 30 度，并绕轴线转动光笔。</translation>
     </message>
     <message>
-        <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The difference is significant.</source>
-        <translation>测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，合计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。差异显著。</translation>
-    </message>
-    <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
     </message>

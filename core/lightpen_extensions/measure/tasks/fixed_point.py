@@ -26,14 +26,12 @@ from lightpen.comparisons.assessment import (
 )
 from lightpen.comparisons.repeatability import Scatter
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot.pivot import in_deviations
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import (
     COVERAGE,
     COVERAGE_FACTOR,
     Decision,
-    chi_quantile,
     chi_square_quantile,
     posture_spread,
     symmetric_root,
@@ -162,19 +160,8 @@ def judged_tip(
     if not found.is_significant or distance <= RELEVANT * limits.tip:
         return None
     x, y, z = change.tolist()
-    if limits.decision(distance, uncertainty, limits.tip) is Decision.REJECTED:
-        another = message(
-            "tip.another",
-            x=x,
-            y=y,
-            z=z,
-            distance=distance,
-            uncertainty=uncertainty,
-            limit=limits.tip,
-        )
-        return refused(another, CALIBRATE_AGAIN)
-    differs = message(
-        "tip.differs",
+    another = message(
+        "tip.another",
         x=x,
         y=y,
         z=z,
@@ -182,7 +169,9 @@ def judged_tip(
         uncertainty=uncertainty,
         limit=limits.tip,
     )
-    return check(differs, CALIBRATE_AGAIN)
+    decision = limits.decision(distance, uncertainty, limits.tip)
+    judged = refused if decision is Decision.REJECTED else check
+    return judged(another, CALIBRATE_AGAIN)
 
 
 def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
@@ -210,9 +199,7 @@ ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
 TILT = 0.6  # rad, to lean the pen by, once round the cone
 N_DRAWS = 2000
 MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less verifies nothing
-ASTRAY = 8.0  # times the median distance from the middle
 LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
-OUTLYING = 1e-6  # probability of such a distance by noise
 UNUSUAL = 0.001  # probability of such a scatter by chance
 
 
@@ -221,7 +208,7 @@ class FixedPoint(Found):
     """A fixed point by N probed points."""
 
     touches: tuple[ProbedPoint, ...]
-    left_out: tuple[ProbedPoint, ...]  # far from all others: the pen was lifted
+    left_out: tuple[ProbedPoint, ...]  # elsewhere: the pen was lifted
     calibrated: Scatter
     nominal: Scatter | None  # with the nominal tip, if known
     uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
@@ -238,26 +225,34 @@ def measure_fixed_point(
     Raises `CalibrationError` if there are too few points at one place.
     """
     instrument, nominal_tip = conditions.instrument.seated, conditions.nominal_tip
-    touches = [point.seated for _, points in runs for point in points]
-    kept, left_out = _at_one_place(touches)
-    calibrated = scatter_of(kept)
-    covariance = joint_covariance(kept, instrument)
-    n = len(kept)
+    points = [point.seated for _, own in runs for point in own]
+    kept = without_others(points).kept if points else ()
+    touches = tuple(points[i] for i in kept)
+    n = len(touches)
+    if n < MIN_TOUCHES:
+        raise CalibrationError(
+            "fixed-point.too-few",
+            n_touches=n,
+            needed=MIN_TOUCHES,
+            usual=VerificationChoices.n_cone,
+        )
+    calibrated = scatter_of(touches)
+    covariance = joint_covariance(touches, instrument)
     blocks = covariance.reshape(n, 3, n, 3)
     of_mean = blocks.sum(axis=(0, 2)) / n**2
     own = np.einsum("nini->i", blocks) / n
     expected = np.sqrt(np.maximum((own - np.diag(of_mean)) * n / (n - 1), 0.0))
     found = FixedPoint(
-        touches=kept,
-        left_out=left_out,
+        touches=touches,
+        left_out=tuple(e for i, e in enumerate(points) if i not in kept),
         calibrated=calibrated,
         nominal=None
         if nominal_tip is None
-        else scatter_of([with_tip(each, instrument, nominal_tip) for each in kept]),
+        else scatter_of([with_tip(each, instrument, nominal_tip) for each in touches]),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
         expected_deviation=expected,
         half_range_uncertainty=_half_range_by_noise(covariance),
-        tip=points_evidence(kept, instrument, conditions.drift),
+        tip=points_evidence(touches, instrument, conditions.drift),
         assessment=accepted(_steady(calibrated)),
     )
     return replace(found, assessment=_assessment(found, conditions.limits))
@@ -280,33 +275,6 @@ def _steady(scatter: Scatter) -> Message:
 def scatter_of(touches: Sequence[ProbedPoint]) -> Scatter:
     """Return the coordinates of touches."""
     return Scatter(np.array([touch.point_cam for touch in touches]))
-
-
-def _at_one_place(
-    touches: Sequence[ProbedPoint],
-) -> tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]:
-    if not touches:
-        raise _too_few(0)
-    points = scatter_of(touches).points
-    distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
-    limit = max(ASTRAY * float(np.median(distances)), LIFTED)
-    noises = np.array([touch.noise for touch in touches])
-    unlikely = in_deviations(points - np.median(points, axis=0), noises)
-    off = (distances > limit) & (unlikely > chi_quantile(3, OUTLYING))
-    kept = tuple(t for t, is_off in zip(touches, off, strict=True) if not is_off)
-    left_out = tuple(t for t, is_off in zip(touches, off, strict=True) if is_off)
-    if len(kept) < MIN_TOUCHES:
-        raise _too_few(len(kept))
-    return kept, left_out
-
-
-def _too_few(n_touches: int) -> CalibrationError:
-    return CalibrationError(
-        "fixed-point.too-few",
-        n_touches=n_touches,
-        needed=MIN_TOUCHES,
-        usual=VerificationChoices.n_cone,
-    )
 
 
 def _assessment(
@@ -405,13 +373,7 @@ def _scatter_entries(scatter: Scatter) -> dict[str, Any]:
 
 
 def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...]:
-    own = [
-        ResultRow(
-            message("fixed-point.half-range"), found.calibrated.half_range.tolist()
-        ),
-        ResultRow(message("table.uncertainty"), found.half_range_uncertainty.tolist()),
-        ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
-    ]
+    own, nominal = found.calibrated, found.nominal
     change = [
         ResultRow(message("fixed-point.tip-change"), found.tip.change.tolist()),
         ResultRow(
@@ -419,14 +381,20 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
             found.tip.uncertainty.tolist(),
         ),
     ]
-    tables = (
-        points_table(found.calibrated.points, message("fixed-point.table")),
-        _comparison(found.calibrated, found.nominal, own, change),
-    )
-    if found.nominal is None:
-        return tables
-    nominal = points_table(found.nominal.points, message("fixed-point.nominal-table"))
-    return *tables, nominal
+    rows = [
+        *_spread(message("fixed-point.current-tip"), own),
+        ResultRow(message("fixed-point.half-range"), own.half_range.tolist()),
+        ResultRow(message("table.uncertainty"), found.half_range_uncertainty.tolist()),
+        ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
+    ]
+    title, columns = message("fixed-point.comparison"), tuple("uvw")
+    points = points_table(own.points, message("fixed-point.table"))
+    if nominal is None:
+        notes = (message("fixed-point.no-nominal-tip"),)
+        return points, ResultTable(title, columns, (*rows, *change), notes)
+    rows += _spread(message("fixed-point.nominal-tip"), nominal)
+    by_nominal = points_table(nominal.points, message("fixed-point.nominal-table"))
+    return points, ResultTable(title, columns, (*rows, *change)), by_nominal
 
 
 def _bands(found: FixedPoint, conditions: Conditions) -> tuple[Band, ...]:
@@ -448,21 +416,6 @@ def _bands(found: FixedPoint, conditions: Conditions) -> tuple[Band, ...]:
         kept = Decision.ACCEPTED if value <= limit else Decision.REJECTED
         bands.append(Band(name, value, u, upper=limit, decision=kept))
     return tuple(bands)
-
-
-def _comparison(
-    own: Scatter,
-    nominal: Scatter | None,
-    more: Sequence[ResultRow] = (),
-    change: Sequence[ResultRow] = (),
-) -> ResultTable:
-    rows = [*_spread(message("fixed-point.current-tip"), own), *more]
-    if nominal is not None:
-        rows += _spread(message("fixed-point.nominal-tip"), nominal)
-    notes = () if nominal is not None else (message("fixed-point.no-nominal-tip"),)
-    return ResultTable(
-        message("fixed-point.comparison"), tuple("uvw"), (*rows, *change), notes
-    )
 
 
 def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:

@@ -13,7 +13,6 @@ from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.tasks.fixed_point import (
     FIXED_POINT,
     NEW_POSTURE,
-    _at_one_place,
     measure_fixed_point,
 )
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
@@ -218,37 +217,15 @@ def test_the_simulated_operator_probes_in_postures_that_all_count(
     assert between.min() > NEW_POSTURE
 
 
-@pytest.mark.parametrize(
-    ("median", "sigma", "off", "is_kept"),
-    [
-        # Within 0.2 mm, eight times the median, or what noise makes once in a million.
-        (0.01, 1e-3, 0.199, True),
-        (0.01, 1e-3, 0.201, False),
-        (0.1, 1e-3, 0.799, True),
-        (0.1, 1e-3, 0.801, False),
-        (0.01, 1.0, 5.53, True),
-        (0.01, 1.0, 5.55, False),
-    ],
-)
-def test_a_point_is_left_out_that_lies_far_from_most_whatever_its_noise(
-    median: float, sigma: float, off: float, is_kept: bool
+def test_points_at_different_places_are_too_few(
+    instrument: Instrument, touching: Touching
 ) -> None:
-    offs = [median, -median, median, -median, off, -off, median, -median]
-    touches = [
-        ProbedPoint(
-            PAPER_CONE + np.array([x, 0.0, 0.0]),
-            sigma**2 * np.eye(3),
-            *(np.zeros((3, 1)), np.eye(3), (f"{i}",), 0.0),
-        )
-        for i, x in enumerate(offs)
-    ]
-    kept, left_out = _at_one_place(touches)
+    points = PAPER_CONE + np.outer([0.0, 0.0, 9.0, -9.0], [1.0, 0.0, 0.0])
 
-    assert [int(each.label) for each in left_out] == ([] if is_kept else [4, 5])
-    assert len(kept) + len(left_out) == len(touches)
     with pytest.raises(CalibrationError) as refused:
-        _at_one_place([])
-    assert refused.value.message.values["n_touches"] == 0
+        measure_fixed_point([("", touching(points))], Conditions(instrument, LIMITS))
+
+    assert refused.value.message.values["n_touches"] == 2
     assert refused.value.message.values["needed"] == 3
 
 

@@ -34,7 +34,7 @@ LIFTED = ProbedPoint(
 
 PASSED = "tip.with-power verification.use-tip pass"
 ANOTHER_TIP = "tip.another verification.calibrate-again repeat"
-DIFFERS = "tip.differs verification.calibrate-again check"
+DIFFERS = "tip.another verification.calibrate-again check"
 WEAK_POWER = "tip.weak-power verification.more-points check"
 
 
