@@ -76,7 +76,7 @@ def verified(seed: int = 1) -> Verified:
             )
             transition = advance_session(setup, state, str(frame.seq), before)
             state = transition.state
-            if transition.events and not first:
+            if transition.recorded and not first:
                 first = clock.now_ns()
         found.append(state.found)
     camera.close()

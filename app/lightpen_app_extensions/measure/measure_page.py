@@ -169,8 +169,6 @@ class MeasurePresenter(VerifyPresenter):
             value = replace(value, state=banner)
             count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
             value = replace(value, count=count)
-            if choices.plan is None:
-                value = replace(value, count="", fraction=None)
             ended = bands_so_far(status.setup, status.state)[-1:]
             words = (f"{worded(e.name)}  {value_text(e)}" for e in ended)
             value = replace(value, time_left="".join(words))

@@ -119,10 +119,6 @@ class PlanPanel(Translated, QWidget):
         """Return the first choice of a plan."""
         return self._open
 
-    def choose(self, plan: Plan) -> None:
-        """Measure by a plan, from its first feature."""
-        choose_plan(self._service, plan)
-
     def _planned(self) -> PlannedFeature | None:
         state = self._status.state
         if state is None or state.done is not None:
@@ -156,7 +152,7 @@ class PlanPanel(Translated, QWidget):
     def open_plan(self, path: Path) -> None:
         """Read a plan and measure by it, or report why that is impossible."""
         job = Job(lambda _: read_plan(path), self)
-        job.succeeded.connect(self.choose)
+        job.succeeded.connect(partial(choose_plan, self._service))
         job.start(
             lambda _: self._notices.withdraw(self), partial(self._notices.notify, self)
         )
@@ -165,7 +161,7 @@ class PlanPanel(Translated, QWidget):
         return str(self._workbench.save_place.folder())
 
     def _on_teach_clicked(self) -> None:
-        self.choose(free_plan(str(self.tr("Part"))))
+        choose_plan(self._service, free_plan(str(self.tr("Part"))))
 
     def _leaving(self) -> Question:
         return Question(
@@ -185,7 +181,7 @@ class PlanPanel(Translated, QWidget):
         choose_plan(self._service, None)
 
     def _on_plate_clicked(self) -> None:
-        self.choose(plate_plan())
+        choose_plan(self._service, plate_plan())
 
     def _on_kind_chosen(self) -> None:
         word = self._kind.currentData()

@@ -52,13 +52,6 @@ class VerifyView:
     has_report: bool = False
 
 
-def is_held(state: SessionState) -> bool:
-    """Return whether the pen is held still on a point that is not recorded yet."""
-    touching = state.touching
-    is_holding = touching.phase is ProbingPhase.HOLDING
-    return is_holding and len(touching.held) >= SETTLING
-
-
 class VerifyPresenter(QObject):
     """Computes the view from the status of runner, camera and station."""
 
@@ -135,7 +128,7 @@ class VerifyPresenter(QObject):
         """Return the content of page and operator view."""
         status, (instruction, banner) = self._status, self._now()
         setup, state, task = status.setup, status.state, status.task
-        if setup is None or state is None or task is None:
+        if setup is None or state is None or task is None or status.refusal is not None:
             return OperatorValue(instruction.short, instruction.hint, banner)
         return OperatorValue(
             instruction=instruction.short,
@@ -305,7 +298,8 @@ class VerifyPresenter(QObject):
         """Return a few words on what to do, and what is seen of the pen."""
         task, touching = setup.task, state.touching
         doubt = Sign.WARNING, Tone.WARN
-        if is_held(state):
+        is_holding = touching.phase is ProbingPhase.HOLDING
+        if is_holding and len(touching.held) >= SETTLING:  # and not recorded yet
             fraction = touching.progress(setup.rules)
             active = Sign.RECORD, Tone.ACTIVE, fraction
             return self.tr("Hold still"), State(self.tr("STEADY"), "", *active)

@@ -52,14 +52,12 @@ class PenPanel(Translated, QWidget):
 
         # Widgets
         self._verdict = SignLabel()
-        self._left_out = text_label(TextSize.SMALL, Tone.QUIET)
-        self._left_out.setWordWrap(True)
         head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
         self._head = self.say(text_label(TextSize.SMALL, Tone.QUIET), head)
         self._table = self.say(NumberTable(), head)
 
         # Layout
-        cells = self._verdict, self._left_out, self._head, self._table, 1
+        cells = self._verdict, self._head, self._table, 1
         vertical_layout(self, *cells, margins=(0, 2 * GRID, 0, 0))
 
         # Connections
@@ -113,8 +111,6 @@ class PenPanel(Translated, QWidget):
         found = self._shown
         health = None if found is None else found.health
         self._verdict.set_value(self._health_message(health))
-        self._left_out.setText(self._left_out_text())
-        self._left_out.setVisible(bool(self._left_out.text()))
         for widget in (self._head, self._table):
             widget.setVisible(health is not None)
         if health is not None and found is not None:
@@ -127,6 +123,7 @@ class PenPanel(Translated, QWidget):
         if health is not None:
             assessment = health.assessment
             words = f"{worded(assessment.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
+            words += self._left_out_text()
             return StatusMessage(words, *GRADE_MARKS[assessment.grade])
         if self._shown is None and not self._reading.is_running:
             return StatusMessage()
@@ -136,13 +133,15 @@ class PenPanel(Translated, QWidget):
             "Two accepted swings of pen {0} with this LED file are needed; so far: {1}."
         )
         pen, n_swings = shortened(self._shown.names.pen), len(self._shown.swings)
-        return StatusMessage(text.format(pen, n_swings), Sign.RING)
+        return StatusMessage(
+            text.format(pen, n_swings) + self._left_out_text(), Sign.RING
+        )
 
     def _left_out_text(self) -> str:
         if self._shown is None or not self._shown.n_left_out:
             return ""
         text = self.tr("Swings with another LED file, or unreadable: {0}.")
-        return text.format(self._shown.n_left_out)
+        return " " + text.format(self._shown.n_left_out)
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
         """Return the shift of each LED and the growth of the pen, by swing."""

@@ -17,8 +17,6 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.probing import (
-    ProbingEvent,
-    ProbingEventKind,
     ProbingPhase,
     ProbingRules,
     ProbingState,
@@ -40,7 +38,6 @@ from lightpen_extensions.measure.tasks.task import (
     TaskProgress,
     VerificationChoices,
     VerificationTask,
-    without_last,
 )
 
 # A verification without a key.
@@ -186,7 +183,8 @@ class SessionTransition:
     """A verification after one more image, with the task that this image ended."""
 
     state: SessionState
-    events: tuple[ProbingEvent, ...] = ()
+    recorded: tuple[str, ...] = ()  # images of the point that is complete now
+    is_broken_off: bool = False  # whether a point was, before it was complete
     finished: AnyTask | None = None
 
 
@@ -211,18 +209,17 @@ def advance_session(
     touched = advance_touch(
         setup.instrument, setup.rules, state.touching, name, detection
     )
-    events = touched.events
-    happened = {event.what for event in events}
+    recorded, is_broken_off = touched.recorded, touched.is_broken_off
     state = replace(state, touching=touched.state)
-    if ProbingEventKind.BROKEN_OFF in happened:
+    if is_broken_off:
         state = replace(state, fault=BROKEN_OFF)
-    if ProbingEventKind.RECORDED not in happened:
-        return SessionTransition(state, events)
+    if not recorded:
+        return SessionTransition(state, is_broken_off=is_broken_off)
     try:
-        state = with_touch(setup, state)
+        ended = end_run(setup, with_touch(setup, state))
     except CalibrationError as error:
-        return SessionTransition(replace(state, fault=error.message), events)
-    return replace(end_run(setup, state), events=events)
+        ended = SessionTransition(replace(state, fault=error.message))
+    return replace(ended, recorded=recorded, is_broken_off=is_broken_off)
 
 
 def end_run(setup: SessionSetup, state: SessionState) -> SessionTransition:
@@ -302,7 +299,7 @@ def _screened(setup: SessionSetup, state: SessionState) -> Screening:
     try:
         require_leds_fit(last.label, (last,))
     except CalibrationError as error:
-        return without_last(len(state.touches), error.message)
+        return Screening(range(len(state.touches) - 1), error.message)
     return setup.task.screen(state.progress(setup, setup.task))
 
 
@@ -413,10 +410,13 @@ def event_kinds(
     before: SessionState | None, transition: SessionTransition
 ) -> list[SessionEventKind]:
     """Return the events of the touches by one more image."""
-    happened = [SessionEventKind(event.what) for event in transition.events]
-    if before is not None and _is_known(transition.state) and not _is_known(before):
-        happened.append(SessionEventKind.KNOWN)
-    return happened
+    is_known = _is_known(transition.state)
+    happened = {
+        SessionEventKind.BROKEN_OFF: transition.is_broken_off,
+        SessionEventKind.RECORDED: transition.recorded,
+        SessionEventKind.KNOWN: is_known and before and not _is_known(before),
+    }
+    return [kind for kind, has_happened in happened.items() if has_happened]
 
 
 def ending(status: VerificationStatus) -> SessionEventKind:

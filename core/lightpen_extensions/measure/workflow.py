@@ -257,11 +257,6 @@ class VerificationWorkflow:
         else:  # it was interrupted before its complete run was ended
             self._follow(state, transition)
 
-    def cancel(self) -> None:
-        """Stop reading."""
-        self._task.drop()
-        self._publish(replace(self._status, reading=ReadingState.NOTHING))
-
     def shut_down(self) -> None:
         """Write pending records and stop."""
         self._task.drop()
@@ -332,7 +327,8 @@ class VerificationWorkflow:
             return
         self._choices = choices
         if self._status.reading is ReadingState.IMAGES:
-            self.cancel()  # they use the previous choices
+            self._task.drop()  # they use the previous choices
+            self._publish(replace(self._status, reading=ReadingState.NOTHING))
         status, tip, setup = self._status, self._status.tip, self._status.setup
         if tip is None or setup is None:
             return

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -250,13 +250,8 @@ def measure_runs(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _SeenRun:
-    """Observations of a run in each camera, by images or centres; or known runs."""
-
-    name: str
-    views: tuple[Observations, ...]
-    known: Sequence[ProbingRun] = ()
+# A run: name, observations in each camera by images or centres, or points if known
+SeenRun: TypeAlias = tuple[str, tuple[Observations, ...], Sequence[ProbingRun]]
 
 
 def _seen(
@@ -264,24 +259,24 @@ def _seen(
     places: Sequence[ImageLocation],
     instrument: Instrument,
     report: Report = lambda fraction: None,
-) -> list[_SeenRun]:
+) -> list[SeenRun]:
     if centers and instrument.rig.n_cameras > 1:
         raise UsageError("cli.centers-of-rig")
-    seen = []
+    seen: list[SeenRun] = []
     for path in centers:
         own = centers_at(path, instrument.pen)
         view = observe_centers(own, instrument.camera, instrument.pen)
-        seen.append(_SeenRun(path.name, (view,)))
+        seen.append((path.name, (view,), ()))
     for i, place in enumerate(places, start=1):
         known = recorded_runs(place, instrument)
         views = () if known else observe_place(place, instrument)
-        seen.append(_SeenRun(place.name, views, known))
+        seen.append((place.name, views, known))
         report(i / len(places))
     return seen
 
 
 def _runs_of(
-    seen: Sequence[_SeenRun], instrument: Instrument, n_frames: int | None
+    seen: Sequence[SeenRun], instrument: Instrument, n_frames: int | None
 ) -> list[ProbingRun]:
     """Return the touches of all runs.
 
@@ -292,9 +287,8 @@ def _runs_of(
     def by(rules: ProbingRules) -> list[ProbingRun]:
         return [
             run
-            for each in seen
-            for run in each.known
-            or [touches_of(each.name, each.views, instrument, rules)]
+            for name, views, known in seen
+            for run in known or [touches_of(name, views, instrument, rules)]
         ]
 
     if n_frames is not None:

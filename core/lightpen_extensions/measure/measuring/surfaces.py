@@ -10,6 +10,7 @@ Motions that leave a feature unchanged, as along a cylinder axis, are not free.
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -76,27 +77,12 @@ class FeatureModel:
         return -(-self.n_unknowns // n_distances)
 
 
-def _no_sizes(n: int, k: int) -> FloatArray:
-    return np.zeros((n, k, 0))
-
-
-def _point(q: FloatArray, _: FloatArray) -> Distances:
-    n = len(q)
-    return Distances(q, np.broadcast_to(np.eye(3), (n, 3, 3)), _no_sizes(n, 3))
-
-
-def _line(q: FloatArray, _: FloatArray) -> Distances:
-    n = len(q)
-    return Distances(
-        q[:, :2], np.broadcast_to(np.eye(3)[:2], (n, 2, 3)), _no_sizes(n, 2)
-    )
-
-
-def _plane(q: FloatArray, _: FloatArray) -> Distances:
-    n = len(q)
-    return Distances(
-        q[:, 2:], np.broadcast_to(np.eye(3)[2:], (n, 1, 3)), _no_sizes(n, 1)
-    )
+def _coordinates(zero: slice, q: FloatArray, _: FloatArray) -> Distances:
+    """Return those coordinates of points that are 0 on a point, line or plane."""
+    values, by_point = q[:, zero], np.eye(3)[zero]
+    n, k = values.shape
+    by_point = np.broadcast_to(by_point, (n, k, 3))
+    return Distances(values, by_point, np.zeros((n, k, 0)))
 
 
 def _radial(across: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -105,19 +91,17 @@ def _radial(across: FloatArray) -> tuple[FloatArray, FloatArray]:
     return lengths, across / np.maximum(lengths, TINY)[:, None]
 
 
-def _sphere(q: FloatArray, sizes: FloatArray) -> Distances:
-    lengths, outwards = _radial(q)
-    return Distances(
-        (lengths - sizes[0])[:, None], outwards[:, None], np.full((len(q), 1, 1), -1.0)
-    )
-
-
-def _cylinder(q: FloatArray, sizes: FloatArray) -> Distances:
-    lengths, outwards = _radial(q[:, :2])
-    gradient = np.column_stack([outwards, np.zeros(len(q))])
+def _round(n_axes: int, q: FloatArray, sizes: FloatArray) -> Distances:
+    """Return distances from a sphere, of 3 axes, or from a cylinder about z, of 2."""
+    lengths, outwards = _radial(q[:, :n_axes])
+    gradient = np.zeros_like(q)
+    gradient[:, :n_axes] = outwards
     return Distances(
         (lengths - sizes[0])[:, None], gradient[:, None], np.full((len(q), 1, 1), -1.0)
     )
+
+
+PLANE, CYLINDER = partial(_coordinates, slice(2, 3)), partial(_round, 2)
 
 
 def _cone(q: FloatArray, sizes: FloatArray) -> Distances:
@@ -135,7 +119,7 @@ def _cone(q: FloatArray, sizes: FloatArray) -> Distances:
 
 def _circle(q: FloatArray, sizes: FloatArray) -> Distances:
     """Return distances from a circle: from the cylinder through it and its plane."""
-    round_, height = _cylinder(q, sizes), _plane(q, sizes[:0])
+    round_, height = CYLINDER(q, sizes), PLANE(q, sizes)
     of_sizes = np.concatenate([round_.by_sizes, np.zeros((len(q), 1, 1))], axis=1)
     return Distances(
         np.column_stack([round_.values, height.values]),
@@ -145,12 +129,12 @@ def _circle(q: FloatArray, sizes: FloatArray) -> Distances:
 
 
 SURFACES = {
-    FeatureKind.POINT: FeatureModel(_point, (0, 1, 2)),
-    FeatureKind.LINE: FeatureModel(_line, (0, 1, 3, 4)),
-    FeatureKind.PLANE: FeatureModel(_plane, (2, 3, 4)),
+    FeatureKind.POINT: FeatureModel(partial(_coordinates, slice(0, 3)), (0, 1, 2)),
+    FeatureKind.LINE: FeatureModel(partial(_coordinates, slice(0, 2)), (0, 1, 3, 4)),
+    FeatureKind.PLANE: FeatureModel(PLANE, (2, 3, 4)),
     FeatureKind.CIRCLE: FeatureModel(_circle, (0, 1, 2, 3, 4), ("radius",)),
-    FeatureKind.SPHERE: FeatureModel(_sphere, (0, 1, 2), ("radius",)),
-    FeatureKind.CYLINDER: FeatureModel(_cylinder, (0, 1, 3, 4), ("radius",)),
+    FeatureKind.SPHERE: FeatureModel(partial(_round, 3), (0, 1, 2), ("radius",)),
+    FeatureKind.CYLINDER: FeatureModel(CYLINDER, (0, 1, 3, 4), ("radius",)),
     FeatureKind.CONE: FeatureModel(_cone, (0, 1, 3, 4), ("radius", "half_angle")),
 }
 

@@ -54,13 +54,6 @@ class ProbingPhase(StrEnum):
     KNOWN = "known"  # the same after a point that was touched before
 
 
-class ProbingEventKind(StrEnum):
-    """Kinds of probing events."""
-
-    RECORDED = "recorded"
-    BROKEN_OFF = "broken off"
-
-
 @dataclass(frozen=True)
 class ProbingRules:
     """Rules of recording a touch."""
@@ -107,20 +100,13 @@ class ProbingState:
         return len(self.held) / (rules.n_frames + rules.n_settling)
 
 
-@dataclass(frozen=True)
-class ProbingEvent:
-    """An event, and the images that it concerns."""
-
-    what: ProbingEventKind
-    names: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class ProbingTransition:
     """The touches after one more image."""
 
     state: ProbingState
-    events: tuple[ProbingEvent, ...] = ()
+    recorded: tuple[str, ...] = ()  # images of the point that is complete now
+    is_broken_off: bool = False  # whether a point was, before it was complete
 
 
 def advance_touch(
@@ -247,7 +233,8 @@ def _without_pose(
     if state.n_lost > MAX_LOST and state.phase is ProbingPhase.AT_REST:
         return ProbingTransition(replace(state, held=()))
     if state.n_lost > MAX_LOST:
-        return ProbingTransition(_let_go(state), _broken_off(rules, state))
+        is_broken_off = _is_broken_off(rules, state)
+        return ProbingTransition(_let_go(state), is_broken_off=is_broken_off)
     if state.phase is ProbingPhase.HOLDING:
         state = replace(state, rejected=(*state.rejected, rejected))
     return ProbingTransition(state)
@@ -266,20 +253,17 @@ def _let_go(state: ProbingState) -> ProbingState:
     )
 
 
-def _broken_off(rules: ProbingRules, state: ProbingState) -> tuple[ProbingEvent, ...]:
-    """Report an incomplete touch, but not small motions of a resting hand."""
+def _is_broken_off(rules: ProbingRules, state: ProbingState) -> bool:
+    """Return whether a touch was incomplete; a resting hand may move a little."""
     needed = rules.n_settling + WORTH_TELLING * rules.n_frames
-    if state.phase is not ProbingPhase.HOLDING or len(state.held) < needed:
-        return ()
-    return (ProbingEvent(ProbingEventKind.BROKEN_OFF, tuple(map(_name, state.held))),)
+    return state.phase is ProbingPhase.HOLDING and len(state.held) >= needed
 
 
 def _moved_to(
     rules: ProbingRules, state: ProbingState, held: tuple[TipObservation, ...]
 ) -> ProbingTransition:
     holding = replace(_let_go(state), phase=ProbingPhase.HOLDING, held=held)
-    again = _held(rules, holding)
-    return ProbingTransition(again.state, (*_broken_off(rules, state), *again.events))
+    return replace(_held(rules, holding), is_broken_off=_is_broken_off(rules, state))
 
 
 def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
@@ -302,8 +286,7 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
         taken=(*state.taken, still),
         places=(*state.places, used[0]),
     )
-    event = ProbingEvent(ProbingEventKind.RECORDED, tuple(map(_name, used)))
-    return ProbingTransition(taken, (event,))
+    return ProbingTransition(taken, tuple(map(_name, used)))
 
 
 def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> bool:

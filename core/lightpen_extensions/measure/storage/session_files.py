@@ -178,7 +178,6 @@ class PendingRecord:
     """A record to be written, after earlier ones of its session."""
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
-    is_simulated: bool
     ends: SessionRecord | None = None  # that this record concludes
     supervisor: SigningKey | None = None  # whom the record names
 
@@ -213,10 +212,9 @@ class SessionKeeping:
 
     def add_task(self, status: VerificationStatus) -> None:
         """Have the result of a complete task written, now or as soon as it can be."""
-        record, tip = task_record(status, self._now(), self.images.journal), status.tip
-        if record is not None and tip is not None:
-            is_simulated = tip.origin is Origin.SIMULATED
-            self._queue(PendingRecord(lambda _: record, is_simulated))
+        record = task_record(status, self._now(), self.images.journal)
+        if record is not None:
+            self._queue(PendingRecord(lambda _: record))
 
     def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
         """Write the outcome of the verification with all its records."""
@@ -272,8 +270,9 @@ class SessionKeeping:
     def _write(self, kept: PendingRecord, files: list[Path]) -> None:
         """Write a record, after the files of its session before it."""
         record = kept.record_of(all_hashed(files))
+        is_simulated = record["origin"] == Origin.SIMULATED
         file = keep_verification(
-            self._data, record, kept.supervisor, is_simulated=kept.is_simulated
+            self._data, record, kept.supervisor, is_simulated=is_simulated
         )
         files.append(file)
         _logger.info("verification written: %s", file)
@@ -289,7 +288,6 @@ def _concluding(
         lambda files: conclusion_record(
             tip.names, tip.origin, tip.tip_file, conclusion, files
         ),
-        tip.origin is Origin.SIMULATED,
         ends=ends,
         supervisor=conclusion.supervisor_key,
     )

@@ -55,11 +55,7 @@ from lightpen_extensions.measure.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
 )
-from lightpen_extensions.measure.probing.probing import (
-    ProbingEventKind,
-    ProbingPhase,
-    approach_of,
-)
+from lightpen_extensions.measure.probing.probing import ProbingPhase, approach_of
 from lightpen_extensions.measure.probing.sources import held_in, point_image_name
 from lightpen_extensions.measure.session import (
     SessionSetup,
@@ -199,18 +195,13 @@ class SessionRecord:
         counting = before if has_ended else state
         touching = counting.touching
         names = {frame.name for still in touching.taken for frame in still.frames}
-        recorded = [
-            event
-            for event in transition.events
-            if event.what is ProbingEventKind.RECORDED
-        ]
         if has_ended:
-            names.update(name for event in recorded for name in event.names)
+            names.update(transition.recorded)
         else:
             deviating = () if touching.deviating is None else (touching.deviating,)
             held = touching.held if touching.phase is ProbingPhase.HOLDING else ()
             names.update(seen.frame.name for seen in (*held, *deviating))
-        self._point += len(recorded)
+        self._point += bool(transition.recorded)
         self._exclude([name for name in self._numbers if name not in names])
         if has_ended:
             self._numbers = {}

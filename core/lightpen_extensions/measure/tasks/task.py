@@ -111,11 +111,6 @@ def keep_all(count: int) -> Screening:
     return Screening(range(count))
 
 
-def without_last(count: int, fault: Message) -> Screening:
-    """Reject the last point."""
-    return Screening(range(count - 1), fault)
-
-
 @dataclass(frozen=True)
 class HandGoal:
     """Goal of a simulated operator for the next point."""
@@ -127,10 +122,6 @@ class HandGoal:
 
 
 FoundT = TypeVar("FoundT", bound=Found)
-
-
-def _nothing(choices: VerificationChoices, ball_diameter: float | None) -> None:
-    """Nothing must be entered."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,7 +153,9 @@ class VerificationTask(Generic[FoundT]):
         len(progress.points)
     )
     # What must be entered before, by choices and ball diameter
-    missing: Callable[[VerificationChoices, float | None], Message | None] = _nothing
+    missing: Callable[[VerificationChoices, float | None], Message | None] = (
+        lambda choices, ball_diameter: None
+    )
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, VerificationChoices], object] | None = None
     is_of_tip: bool = True  # values are shown amid a run, and how the pen was held
