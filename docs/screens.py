@@ -558,9 +558,7 @@ def _probed(
     state = SessionState()
     for goal in goals:
         assert goal.point is not None
-        point = goal.point
-        if goal.outwards is not None:
-            point = point + BALL / 2 * goal.outwards
+        point = goal.point + BALL / 2 * goal.outwards
         tilt = 0.1 if goal.tilt == 0 else goal.tilt
         R = postures_of(lean_vectors(tilt, goal.direction, 0.0)[None]).rotations
         t = scene.cone_cam + point - R @ scene.tip_pen
