@@ -17,7 +17,7 @@ from lightpen_app.widgets.state_banner import StatusMessage, message_icon
 from lightpen_extensions.measure.tasks.task import Band
 
 ROW = Qt.ItemDataRole.UserRole  # a `CheckRow`
-WIDTH = 46 * GRID  # px
+WIDTH = 38 * GRID  # px
 QWIDGETSIZE_MAX = 16_777_215  # px, as PySide does not name it
 
 
@@ -71,7 +71,6 @@ class CheckList(QListWidget):
             item = self.item(i)
             item.setData(ROW, row)
             item.setText(row.words)
-            item.setToolTip(row.words)
             sign = StatusMessage("", row.sign, row.tone)
             item.setIcon(message_icon(sign, self.window()))
         self.blockSignals(False)

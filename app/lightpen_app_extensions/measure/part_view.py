@@ -206,10 +206,9 @@ class FigurePanel(QWidget):
 def posture_value(setup: SessionSetup, state: SessionState) -> DialValue:
     """Return the postures of the pen at the points of a check, and the present one."""
     points, pen = chain(*state.runs, state.touches), setup.instrument.pen
-    dial = dial_of(
-        [posture_of(pen, point.rotation) for point in points],
-        live_posture(setup, state),
-    )
+    held = () if state.touching.n_lost else state.touching.held
+    live = posture_of(pen, held[-1].frame.rotation) if held else None
+    dial = dial_of([posture_of(pen, point.rotation) for point in points], live)
     goal = setup.task.hand(setup.choices, len(state.runs), len(state.touches))
     return replace(dial, target=Posture(goal.tilt, goal.direction, 0.0))
 
@@ -228,11 +227,3 @@ def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:
         n_upright_needed=min(n_upright, 1),
         posture=posture,
     )
-
-
-def live_posture(setup: SessionSetup, state: SessionState) -> Posture | None:
-    """Return the present posture, if detected."""
-    touching = state.touching
-    if not touching.held or touching.n_lost:
-        return None
-    return posture_of(setup.instrument.pen, touching.held[-1].frame.rotation)

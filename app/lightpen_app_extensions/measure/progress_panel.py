@@ -21,7 +21,12 @@ from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.bars import Question, QuestionBar, ReasonBar, usual_reasons
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.fitting import FittedText, PageScroll
+from lightpen_app.widgets.fitting import (
+    NO_ROOM,
+    FittedText,
+    PageScroll,
+    ResponsiveLayout,
+)
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.workbench import Workbench
@@ -31,16 +36,19 @@ from lightpen_extensions.measure.measuring.report import ResultTable, points_tab
 from lightpen_extensions.measure.session import SessionSetup, SessionState
 
 PROGRESS_STEPS = 1000
-STATE_HEIGHT = 7 * GRID  # px, at least
+STATE_HEIGHT = 9 * GRID  # px, at least
 
 
-class ProgressPanel(Translated, QWidget):
+class ProgressPanel(ResponsiveLayout, Translated, QWidget):
     """Shows instruction, state and progress of a verification in one row."""
+
+    narrow_below = 100 * GRID  # px; then the instruction stands above
 
     def __init__(self, workbench: Workbench, run: VerificationRun) -> None:
         super().__init__()
         self._workbench, self._run = workbench, run
         self._runner = self._run.runner
+        self._room = NO_ROOM
 
         # Widgets
         self._question = QuestionBar()
@@ -72,12 +80,7 @@ class ProgressPanel(Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
-        rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
-        rows.addWidget(self._instruction, 0, 0)
-        rows.addWidget(self._buttons, 0, 1)
-        rows.addWidget(self._hint, 1, 0, 1, 2)
-        rows.addWidget(self._state, 2, 0, 1, 2)
-        rows.setColumnStretch(0, 1)
+        self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         horizontal_layout(
             self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
@@ -85,6 +88,7 @@ class ProgressPanel(Translated, QWidget):
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
         self._row = horizontal_layout(self._buttons, *buttons, 1)
+        self._use_room()
 
         # Connections
         self._run.refused.connect(self._on_refused)
@@ -127,6 +131,19 @@ class ProgressPanel(Translated, QWidget):
     def hide_question(self) -> None:
         """Hide the question."""
         self._question.hide()
+
+    @override
+    def _use_room(self) -> None:
+        """Place the state beside the instruction, or below where width is little."""
+        is_narrow = self._room.is_narrow
+        wide = (0, 0), (1, 0), (2, 0), (0, 1, 3, 1)
+        narrow = (0, 0), (1, 0, 1, 2), (0, 1), (2, 0, 1, 2)
+        cells = self._instruction, self._hint, self._buttons, self._state
+        for cell, place in zip(cells, narrow if is_narrow else wide, strict=True):
+            self._rows.removeWidget(cell)
+            self._rows.addWidget(cell, *place)
+        self._rows.setColumnStretch(0, 1)
+        self._rows.setColumnStretch(1, 0 if is_narrow else 1)
 
     @override
     def _retranslate(self) -> None:

@@ -160,9 +160,6 @@ class VerificationTask(Generic[FoundT]):
     check: Callable[[Runs, Conditions, VerificationChoices], object] | None = None
     is_of_tip: bool = True  # values are shown amid a run, and how the pen was held
 
-    def __str__(self) -> str:
-        return self.kind
-
     def done(self, choices: VerificationChoices, progress: TaskProgress) -> float:
         """Return the completed fraction of the current run, 0 to 1."""
         needed = self.n_points(choices, len(progress.runs))

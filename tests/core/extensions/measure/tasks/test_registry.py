@@ -12,7 +12,7 @@ from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask, task_of
 from lightpen_extensions.measure.tasks.task import TaskProgress, VerificationChoices
 
-tasks = pytest.mark.parametrize("task", TASKS, ids=str)
+tasks = pytest.mark.parametrize("task", TASKS, ids=[each.kind for each in TASKS])
 PLANNED = VerificationChoices(PART.kind, free_plan("Part"))
 
 
