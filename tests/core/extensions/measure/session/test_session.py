@@ -132,7 +132,7 @@ def session(instrument: Instrument) -> Session:
     return Session(setup, Holder(instrument.rig, instrument.pen))
 
 
-@pytest.mark.parametrize("task", TASKS, ids=str)
+@pytest.mark.parametrize("task", TASKS, ids=[each.kind for each in TASKS])
 def test_the_simulated_hand_completes_each_task(
     session: Session, task: AnyTask
 ) -> None:
