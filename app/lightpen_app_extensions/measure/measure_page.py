@@ -238,7 +238,7 @@ class MeasurePage(ProbingPage):
     @override
     def first_control(self) -> QWidget:
         lacks_plan = self._measures.lacks_plan()
-        return self._plan.first_control() if lacks_plan else self._checks
+        return self._plan.open_button if lacks_plan else self._checks
 
     @override
     def run_main_action(self) -> None:

@@ -58,7 +58,7 @@ class PlanPanel(Translated, QWidget):
         self._question = QuestionBar()
         self._question.set_words(self._leaving)
         self._start, self.of_part, self.of_feature = (QWidget() for _ in range(3))
-        self._open = self.make_button(self.tr("Open a plan..."), self.pick_plan)
+        self.open_button = self.make_button(self.tr("Open a plan..."), self.pick_plan)
         self._teach = self.make_button(self.tr("Teach a plan"), self._on_teach_clicked)
         plate = self.tr("Try the simulated plate")
         self._plate = self.make_button(plate, self._on_plate_clicked)
@@ -83,10 +83,10 @@ class PlanPanel(Translated, QWidget):
         # Layout
         vertical_layout(self, self._question, (self._start, 1))
         rows = vertical_layout(self._start, 1, spacing=3 * GRID, margins=4 * GRID)
-        buttons = self._open, self._teach, self._plate
+        buttons = self.open_button, self._teach, self._plate
         for button, text in zip(buttons, texts, strict=True):
             words = self.say(text_label(TextSize.LEAD), text)
-            button.setProperty("inviting", button is self._open)
+            button.setProperty("inviting", button is self.open_button)
             button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
             horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
         fill(rows, 2)
@@ -114,10 +114,6 @@ class PlanPanel(Translated, QWidget):
         self._plate.set_why_not(why_not)
         for button in (self._save_plan, self._export):
             button.setVisible(self._part() is not None)
-
-    def first_control(self) -> QWidget:
-        """Return the first choice of a plan."""
-        return self._open
 
     def _planned(self) -> PlannedFeature | None:
         state = self._status.state
