@@ -6,7 +6,6 @@ from lightpen.pen_check.draft import PenDraft, corrected, exchanged
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.face import Services, can_discover
-from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.theme import GRID
@@ -150,7 +149,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _retranslate(self) -> None:
         self._files.retranslate()
         self._matching.retranslate()
-        self._table.set_flaw(worded(self._leds.state.check.flaw))
+        self._table.set_flaw(self._leds.state.check.flaw)
         self._table.set_marked(self._match.reasons())
         self._refresh()
 
@@ -173,7 +172,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _on_draft_changed(self) -> None:
         state = self._leds.state
         self._table.set_value(state.draft, state.changes)
-        self._table.set_flaw(worded(state.check.flaw))
+        self._table.set_flaw(state.check.flaw)
         self._refresh()
         self.changed.emit()
 

@@ -20,13 +20,27 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.messages import Message
 from lightpen.model.pen import MAX_LEDS, MIN_LEDS
 from lightpen.pen_check.draft import COLUMNS, CellError, PenDraft
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign, draw_sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
-from lightpen_app.look.words import AXES, number_text, plain_tooltip, set_tooltip
+from lightpen_app.look.theme import (
+    GRID,
+    TextSize,
+    Tone,
+    colors_of,
+    set_tone,
+    text_label,
+)
+from lightpen_app.look.words import (
+    AXES,
+    in_unit,
+    number_text,
+    plain_tooltip,
+    set_tooltip,
+)
 from lightpen_app.widgets.controls import ENTER_KEYS
 from lightpen_app.widgets.fields import EnterEdit, Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
@@ -240,6 +254,10 @@ class _DraftModel(TitledModel):
                 return ": ".join(
                     filter(None, (self._text(row, column), self._remark(row, column)))
                 )
+            case Qt.ItemDataRole.ForegroundRole if (row, column - 1) in self._flaws:
+                widget = self.parent()
+                assert isinstance(widget, QWidget)
+                return colors_of(widget.palette()).tone(Tone.BAD)
             case _ if role == SIGN_ROLE:
                 return Sign.WARNING if self._remark(row, column) else Sign.NONE
         return None
@@ -248,7 +266,9 @@ class _DraftModel(TitledModel):
     def setData(
         self, index: Index, value: object, role: int = Qt.ItemDataRole.EditRole
     ) -> bool:
-        draft = self.draft.with_cell(index.row(), index.column() - 1, str(value))
+        column = index.column() - 1
+        text = in_unit(str(value), "mm") if column < N_COORDINATES else str(value)
+        draft = self.draft.with_cell(index.row(), column, text)
         if draft == self.draft:
             return False
         self.set_draft(draft)
@@ -372,6 +392,8 @@ class LedTablePanel(Translated, QGroupBox):
         self._diameter.textEdited.connect(self._on_diameter_edited)
         for edit in self._tip:
             edit.textEdited.connect(self._on_tip_edited)
+        for edit in (self._diameter, *self._tip):
+            edit.editingFinished.connect(self._on_typed)
 
         self._retranslate()
 
@@ -387,9 +409,15 @@ class LedTablePanel(Translated, QGroupBox):
             _show(edit, text)
         self._refresh()
 
-    def set_flaw(self, sentence: str) -> None:
-        """Show which cell is wrong; empty if none is."""
-        self._flaw.set_value(StatusMessage(sentence, Sign.WARNING, Tone.BAD))
+    def set_flaw(self, flaw: Message | None) -> None:
+        """Show which cell or field is wrong."""
+        self._flaw.set_value(StatusMessage(worded(flaw), Sign.WARNING, Tone.BAD))
+        code, axis = ("", "") if flaw is None else (flaw.code, flaw.values.get("axis"))
+        is_wrong = code in ("draft.diameter", "draft.disc-diameter")
+        set_tone(self._diameter, Tone.BAD if is_wrong else Tone.PLAIN)
+        for own, edit in zip(AXES, self._tip, strict=True):
+            is_wrong = code == "draft.nominal-tip" and axis == own
+            set_tone(edit, Tone.BAD if is_wrong else Tone.PLAIN)
 
     def flaw(self) -> str:
         """Return the message on the cells."""
@@ -433,6 +461,13 @@ class LedTablePanel(Translated, QGroupBox):
 
     def _on_diameter_edited(self, text: str) -> None:
         self._take(replace(self._value, diameter=text.strip()))
+
+    def _on_typed(self) -> None:
+        """Show what was typed in another unit in mm."""
+        diameter = in_unit(self._diameter.text(), "mm")
+        tip = tuple(in_unit(edit.text(), "mm") for edit in self._tip)
+        if (diameter, tip) != (self._value.diameter, self._value.tip):
+            self._take(replace(self._value, diameter=diameter, tip=tip))
 
     def _on_tip_edited(self) -> None:
         tip = tuple(edit.text().strip() for edit in self._tip)

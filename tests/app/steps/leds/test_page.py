@@ -604,21 +604,31 @@ def test_diameter_and_tip_are_edited_with_the_table(
 ) -> None:
     seen.enter("Diameter of the LED discs, mm", "8")
     seen.enter("Nominal tip centre, y, mm", "-95,5")
+    seen.enter("Nominal tip centre, z, mm", "-2.5 cm")
+    type_cell(seen, 1, X, "20 um")
     save_as(seen, tmp_path / "leds.json")
 
     pen = in_use(workbench).pen
     assert pen.diameter == 8
     assert pen.nominal_tip is not None
     assert pen.nominal_tip.tolist() == [0.0, -95.5, -25.0]
+    assert cell(seen, 1, X) == "0.02"
 
 
 def test_a_diameter_or_tip_that_cannot_be_is_reported(seen: "Seen") -> None:
     seen.enter("Diameter of the LED discs, mm", "x")
     assert 'Diameter of the discs: "x" is not a number.' in seen.words
+    assert (
+        seen.named("Diameter of the LED discs, mm").property("tone") == Tone.BAD.value
+    )
 
     seen.enter("Diameter of the LED discs, mm", "10")
     seen.enter("Nominal tip centre, y, mm", "-9O")
     assert 'Nominal tip, y: "-9O" is not a number (letter O).' in seen.words
+    assert (
+        seen.named("Diameter of the LED discs, mm").property("tone") == Tone.PLAIN.value
+    )
+    assert seen.named("Nominal tip centre, y, mm").property("tone") == Tone.BAD.value
 
 
 def test_the_nominal_tip_of_the_first_step_is_reported_where_it_rules(
