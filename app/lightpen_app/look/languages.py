@@ -61,7 +61,8 @@ class LanguageSwitch(QObject):
         self._install(f"lightpen_{language}", str(TRANSLATIONS))
 
     def remove(self) -> None:
-        """Remove the translations; the program's own texts remain."""
+        """Remove the translations; the program's own texts and numbers remain."""
+        QLocale.setDefault(QLocale(SOURCE_LANGUAGE))
         for translator in self._translators:
             self._application.removeTranslator(translator)
             translator.deleteLater()
