@@ -25,17 +25,17 @@ from functools import cache
 from html import escape
 
 import pyqtgraph as pg
-from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QLocale, QPoint
+from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QPoint
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPicture
 
 from lightpen.model.names import Laboratory
 from lightpen.record.calibrations import TracedItem
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind
-from lightpen_app.look.languages import listed
+from lightpen_app.look.languages import OWN_NAME, listed, own_name
 from lightpen_app.look.theme import LIGHT, TextSize, font, palette_of, scaled
 from lightpen_app.widgets.figure import Figure
-from lightpen_resources import RESOURCES, SOURCE_LANGUAGE
+from lightpen_resources import RESOURCES
 
 translate = QCoreApplication.translate
 
@@ -238,7 +238,7 @@ def fill_template(section: str, content: Content) -> tuple[Piece, ...]:
     """Return the parts of a section in the language of the window."""
     parts: list[Piece] = []
     keeps = False
-    for stanza in _sections(QLocale().name())[section].split("\n\n"):
+    for stanza in _sections(translate("language", OWN_NAME))[section].split("\n\n"):
         head, *lines = stanza.splitlines()
         command, *words = head.split(" ")
         if command in (":keep", ":free"):
@@ -260,10 +260,10 @@ def cells(texts: Iterable[str]) -> str:
 
 
 @cache
-def _sections(locale: str) -> dict[str, str]:
-    files = {QLocale(file.stem).name(): file for file in REPORTS.glob("*.txt")}
-    file = files.get(locale, REPORTS / f"{SOURCE_LANGUAGE}.txt")
-    _, *parts = SECTION.split(file.read_text(encoding="utf-8"))
+def _sections(name: str) -> dict[str, str]:
+    """Return the sections of the language that calls itself by a name."""
+    files = {own_name(file.stem): file for file in REPORTS.glob("*.txt")}
+    _, *parts = SECTION.split(files[name].read_text(encoding="utf-8"))
     return {
         name: text.strip() for name, text in zip(parts[::2], parts[1::2], strict=True)
     }
