@@ -61,8 +61,7 @@ class LanguageSwitch(QObject):
         self._install(f"lightpen_{language}", str(TRANSLATIONS))
 
     def remove(self) -> None:
-        """Remove the translations; the program's own texts and numbers remain."""
-        QLocale.setDefault(QLocale(SOURCE_LANGUAGE))
+        """Remove the translations; the program's own texts remain."""
         for translator in self._translators:
             self._application.removeTranslator(translator)
             translator.deleteLater()

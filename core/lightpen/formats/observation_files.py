@@ -21,9 +21,10 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, read_bytes, read_text
+from lightpen.formats.files import MEGABYTE, opened, read_text
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
+    HEAD,
     SEQUENCE_SUFFIXES,
     GivenPoses,
     foreign_poses,
@@ -163,9 +164,8 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
         given = read_sequence(path, tool)
         return _foreign_poses(given, path)
     name = printable(path.name)
-    refuse_foreign_poses(
-        read_bytes(path, message("file.poses"), OBSERVATION_FILE_LIMIT), name
-    )
+    with opened(path, message("file.poses"), OBSERVATION_FILE_LIMIT) as stream:
+        refuse_foreign_poses(stream.read(HEAD), name)
     text = read_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     text = motive_table(text, name) if is_motive(text) else text
     if is_own(parse_table(text, name, is_foreign=True)):

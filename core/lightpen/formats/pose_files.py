@@ -292,6 +292,7 @@ SEQUENCE_LIMIT = 10**12  # bytes; pixels are not read
 LONGEST_HEADER = 64_000_000  # bytes
 NOTHING_BELOW = -1e20  # NDI writes -3.7e28 for what it does not see
 MAX_TOOLS = 20
+HEAD = 1000  # bytes, that tell the form of a file
 
 _FOREIGN = (
     (r"\A\s*[\[{]", "JSON"),
@@ -322,7 +323,7 @@ class GivenPoses:
 
 def refuse_foreign_poses(head: bytes, name: str) -> None:
     """Refuse poses in a form that is not read, by its name."""
-    text = head[:1000].decode("latin-1").removeprefix("\xef\xbb\xbf")
+    text = head.decode("latin-1").removeprefix("\xef\xbb\xbf")
     for pattern, program in _FOREIGN:
         if re.search(pattern, text):
             raise FileError("poses.foreign", name=name, program=program)
