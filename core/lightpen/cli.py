@@ -43,7 +43,6 @@ COMMANDS = (
     ("pen", "pen", "transform measured LED coordinates into the pen frame"),
     ("repeatability", "repeatability", "compare calibrations of one tip"),
     ("recalculate", "recalculate", "recompute calibrations and check U by Monte Carlo"),
-    ("improve-pen", "pen_health", "improve the LED file from several swings"),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")

@@ -8,8 +8,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.comparisons.pen_health import PenHealth
-from lightpen.comparisons.pen_over_time import PenOverTime, read_pen_over_time
+from lightpen.comparisons.pen_health import PenHealth, PenOverTime, read_pen_over_time
 from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.artefacts import Artefact

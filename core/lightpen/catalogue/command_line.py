@@ -36,7 +36,6 @@ MESSAGES = {
     "cli.camera-of-other-size": "{file} is for images of {width} x {height} px; the images have {seen_width} x {seen_height} px. Give the file of this camera, or --binning or --roi if the images are binned or cropped.",
     "cli.no-such-image": "--leave-out {name} is none of the images. Give a file name without its folder, as in the report.",
     "cli.pen-over-raw": "{out} would replace its input, the measured LEDs. Give the LED file another name.",
-    "cli.out-over-input": "--out {out} would replace the input file of that name. Give the new LED file another name.",
     "cli.swing-of-another-pen": "{result} was calibrated with the LED file {its_pen}, not with --pen {pen}. Give that file, and only calibrations with it.",
     "cli.another-tip": "{other} is a calibration of tip {its}, {first} of tip {tip}. Give calibrations of one tip.",
     "stream.another-size": "The images have {width} x {height} px; the intrinsics are for {its_width} x {its_height} px. Give the intrinsics file of these images.",

@@ -1,4 +1,4 @@
-"""``lightpen verify pen``, ``verify press`` and ``improve-pen``: swings of one pen."""
+"""``lightpen verify pen`` and ``verify press``: swings of one pen."""
 
 import argparse
 from pathlib import Path
@@ -11,19 +11,15 @@ from lightpen.commands.arguments import (
     supervisor_signature,
 )
 from lightpen.commands.console import (
-    are_same,
     printing,
     require_other_file,
     shown,
     verdict_status,
 )
 from lightpen.commands.entering import add_entering, keep_record
-from lightpen.comparisons.assessment import read_scale
-from lightpen.comparisons.led_file import improve_pen
 from lightpen.comparisons.pen_health import GROWN, MOVED, examine_pen, require_one_pen
-from lightpen.comparisons.pen_over_time import PRESS_TEST, PressTest, press_test
+from lightpen.comparisons.press_test import PRESS_TEST, PressTest, press_test
 from lightpen.comparisons.records import (
-    improved_pen_text,
     pen_health_entries,
     pen_health_text,
     press_test_text,
@@ -34,8 +30,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import all_hashed
 from lightpen.formats.own_json import file_entry
-from lightpen.formats.pen_files import read_pen, write_pen
-from lightpen.formats.rig_files import write_camera
+from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
@@ -48,38 +43,6 @@ from lightpen.record.results.result_folder import data_folder_of
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify pen``."""
     parser.set_defaults(run=_verify_pen)
-    _add_swings(parser, is_required=False)
-    add_exit_by_verdict(parser)
-    add_json(parser)
-    add_entering(parser)
-
-
-def add_improve_pen(parser: argparse.ArgumentParser) -> None:
-    """Add ``lightpen improve-pen``."""
-    parser.set_defaults(run=_improve_pen)
-    _add_swings(parser)
-    parser.add_argument(
-        "--length",
-        type=Path,
-        metavar="FILE.json",
-        help="length verification with this pen, for its scale",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="NEW.json",
-        help="new LED file to write",
-    )
-    add_file(
-        parser,
-        "--out-camera",
-        "NEW.yaml",
-        "new intrinsics file to write, by the same swings",
-    )
-
-
-def _add_swings(parser: argparse.ArgumentParser, *, is_required: bool = True) -> None:
     parser.add_argument(
         "results",
         nargs="+",
@@ -87,7 +50,10 @@ def _add_swings(parser: argparse.ArgumentParser, *, is_required: bool = True) ->
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    add_camera_and_pen(parser, states_pen=False, is_required=is_required)
+    add_camera_and_pen(parser, states_pen=False, is_required=False)
+    add_exit_by_verdict(parser)
+    add_json(parser)
+    add_entering(parser)
 
 
 @printing
@@ -113,26 +79,6 @@ def _verify_pen(options: argparse.Namespace) -> int:
     )
     keep_record(options, record, swings[0])
     return verdict_status(options, found.assessment.grade)
-
-
-@printing
-def _improve_pen(options: argparse.Namespace) -> None:
-    for path in (*options.results, options.camera, options.pen, options.length):
-        for out in (options.out, options.out_camera):
-            if path is not None and out is not None and are_same(path, out):
-                raise UsageError("cli.out-over-input", out=out)
-    swings = _swings(options)
-    pen = _pen(options, swings[0])
-    camera = read_camera(options.camera)
-    scale = None if options.length is None else read_scale(options.length)
-    found = improve_pen(
-        swings, camera, pen, scale, must_gain=options.out_camera is None
-    )
-    write_pen(found.pen, options.out, sha256(options.pen))
-    if options.out_camera is not None:
-        write_camera(found.camera, options.out_camera)
-    print(shown(improved_pen_text(found)))
-    print(shown(f"The new LED file is {options.out}."))
 
 
 def _pen(options: argparse.Namespace, swing: CalibrationFile) -> Pen:

@@ -80,7 +80,7 @@ def _recalculate(options: argparse.Namespace) -> None:
         for path in options.results if options.monte_carlo is not None else ():
             found = recompute(path)
             if found.inputs.rig is not None:
-                raise UsageError("led-file.of-rig", path=path)
+                raise UsageError("recalculate.of-rig", path=path)
             trials[path.name] = run_monte_carlo(
                 found.calibration, options.monte_carlo, in_workers, report
             )

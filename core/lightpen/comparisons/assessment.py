@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from msgspec import Struct
@@ -97,10 +96,7 @@ def _is_significant(
     return abs(value) > max(by_chance * uncertainty, RELEVANT * limit)
 
 
-LENGTH = message("file.length")
 DRIFT = message("file.drift")
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -112,38 +108,16 @@ class Scale:
     uncertainty_before: float
 
 
-class _Scale(Struct):
-    factor: float
-    expanded_uncertainty: float
-    expanded_uncertainty_before: float
-
-
-class _Length(Struct):
-    scale: _Scale
-
-
 class _Drift(Struct):
     standard_uncertainty_share_mm: Vector
 
 
-def read_scale(path: Path) -> Scale:
-    """Read the scale that a verified length gives the pen."""
-    scale = _read(path, _Length, LENGTH).scale
-    return Scale(
-        scale.factor, scale.expanded_uncertainty, scale.expanded_uncertainty_before
-    )
-
-
 def read_drift(path: Path) -> FloatArray:
     """Return the standard uncertainty by a drift for points probed meanwhile."""
-    found = _read(path, _Drift, DRIFT)
-    return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
-
-
-def _read(path: Path, shape: type[T], what: Message) -> T:
-    data = read_bytes(path, what, LARGEST_RECORD)
+    data = read_bytes(path, DRIFT, LARGEST_RECORD)
     try:
         has_checksum(data)
-        return parse_own_json(data, shape)
+        found = parse_own_json(data, _Drift)
     except DamagedError as error:
-        raise FileError("verification.other-file", path=path, what=what) from error
+        raise FileError("verification.other-file", path=path, what=DRIFT) from error
+    return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)

@@ -11,7 +11,8 @@ that repeats from swing to swing, their records state; a pen grew if the differe
 more than chance and matters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,15 +25,22 @@ from lightpen.comparisons.assessment import (
     check,
     refused,
 )
-from lightpen.errors import CalibrationError, UsageError
+from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.opened_files import hashed
 from lightpen.messages import message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR, normal_quantile
+from lightpen.model.names import Origin
+from lightpen.model.pen import Pen
 from lightpen.model.rigid import skew
-from lightpen.record.calibrations import CalibrationFile
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import Preparation
 
 MIN_SWINGS = 2
+MOST = 20  # swings of a pen that are read, the newest
 MOVED = 0.02  # mm, from which on an LED has moved
 STANDS_OUT = 5.0  # times the median change of all LEDs
 GROWN = 6e-5  # relative, from which on it matters: 0.006 mm of a tip 100 mm away
@@ -105,6 +113,54 @@ def examine_pen(
         moved=moved,
         growth=growth,
         assessment=_assessment(swings, moved, growth, len(growths)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PenOverTime:
+    """A pen over its accepted swings with the LED file that is chosen."""
+
+    names: Names
+    is_simulated: bool
+    pen: Pen
+    pen_sha256: str
+    swings: tuple[CalibrationFile, ...]  # the oldest first
+    n_left_out: int  # with another LED file, or unreadable
+    health: PenHealth | None  # None of fewer than two swings
+
+
+def read_pen_over_time(
+    archive: FolderArchive, preparation: Preparation, report: Callable[[float], None]
+) -> PenOverTime:
+    """Read the accepted swings of the pen that is chosen."""
+    pen_file, camera_file = preparation.pen_file, preparation.camera_file
+    if pen_file is None:
+        raise ValueError("`pen_file` must be chosen.")
+    pen_sha256 = hashed(pen_file.path).sha256
+    is_simulated = preparation.origin is Origin.SIMULATED
+    names = preparation.names
+    files = archive.files_of_pen(names.pen, is_simulated=is_simulated)[:MOST]
+    found: list[CalibrationFile] = []
+    for n, file in enumerate(files, start=1):
+        with suppress(FileError, UsageError):  # reported by whoever reads the archive
+            swing = read_calibration(file)
+            if swing.pen_sha256 == pen_sha256:
+                found.append(swing)
+        report(n / len(files))
+    swings = tuple(sorted(found, key=lambda swing: swing.when))
+    camera = None if camera_file is None else camera_file.camera
+    return PenOverTime(
+        names=names,
+        is_simulated=is_simulated,
+        pen=pen_file.pen,
+        pen_sha256=pen_sha256,
+        swings=swings,
+        n_left_out=len(files) - len(swings),
+        health=(
+            examine_pen(swings, camera, pen_file.pen.leds)
+            if len(swings) >= MIN_SWINGS
+            else None
+        ),
     )
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.led_file import ImprovedPen
 from lightpen.comparisons.pen_health import Growth, PenHealth
-from lightpen.comparisons.pen_over_time import PressTest
+from lightpen.comparisons.press_test import PressTest
 from lightpen.comparisons.repeatability import Repeatability
 from lightpen.formats.own_json import plain, record_heading
 from lightpen.local_time import local_now
@@ -175,27 +174,6 @@ def press_test_text(found: PressTest) -> str:
     return "\n".join(
         [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
     )
-
-
-def improved_pen_text(found: ImprovedPen) -> str:
-    """Return the new places of the LEDs of a pen as text."""
-    pen = found.pen
-    lines = [
-        "LEDs of the pen, mm: new, and new less old",
-        f"{'LED':<5}" + "".join(f"{axis:>{COLUMN}}" for axis in ("x", "y", "z") * 2),
-    ]
-    for j, (place, move) in enumerate(zip(pen.leds, found.moves, strict=True)):
-        cells = "".join(f"{x:{COLUMN}.4f}" for x in (*place, *move))
-        lines.append(f"{j + 1:<5}{cells}")
-    lines += [
-        f"A coordinate is known to {pen.led_sigma:.5f} mm, the scale to "
-        f"{1e6 * (pen.scale_sigma or 0.0):.1f} ppm (k = 1), by "
-        + ", ".join(found.pooled)
-        + ".",
-        f"{found.held_out} confirms it: residuals of {found.sigma_after:.4f} px, "
-        f"{found.sigma_before:.4f} px with the old file.",
-    ]
-    return "\n".join(lines)
 
 
 def verdict_lines(assessment: VerificationAssessment, rule: Message) -> list[str]:

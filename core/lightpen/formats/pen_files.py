@@ -35,7 +35,6 @@ A JSON file has
 ``found_from``  of LEDs found from images (``lightpen discover``), optional: an LED
                 centre of each of these ``images``, px, and ``diameter`` and
                 ``led_covariance`` without them
-``parent_sha256`` of the file that this one was made better from, not read
 ``comment``     not read
 ================== ===================================================================
 
@@ -84,7 +83,6 @@ _FILE_KEYS = {
     *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
     "normal_covariance",
     *("expansion", "expansion_sigma", "temperature_c"),
-    "parent_sha256",
     "found_from",
 }
 _FOUND_KEYS = {"images", "diameter", "led_covariance"}
@@ -196,8 +194,8 @@ def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
     return np.array([unit_normal(led.counted(3, "normal"), led.name) for led in leds])
 
 
-def json_text(pen: Pen, parent_sha256: str) -> str:
-    """Return a pen as JSON, with the hash of the file it was improved from."""
+def json_text(pen: Pen) -> str:
+    """Return a pen as JSON."""
     leds = [
         {"led": number, "x": led[0], "y": led[1], "z": led[2], "normal": normal}
         for number, (led, normal) in enumerate(
@@ -212,7 +210,6 @@ def json_text(pen: Pen, parent_sha256: str) -> str:
         f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
         *(f'"{what}": {number!r}' for what, number in stated_numbers(pen).items()),
         f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
-        *([f'"parent_sha256": "{parent_sha256}"'] if parent_sha256 else []),
         f'"leds": [\n    {rows}\n  ]',
     ]
     if pen.led_covariance is not None:
@@ -288,16 +285,15 @@ def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
     return _pen(_read(path, units), None, None)
 
 
-def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
+def write_pen(pen: Pen, path: Path) -> None:
     """Write a pen as a table or as JSON, to be read back to the last digit.
 
     The name ends in .csv or .json; else, or where a table has no place for name,
-    nominal tip or covariance of the pen, a `UsageError` is raised. ``parent_sha256`` is
-    the checksum of the file from which the pen was improved.
+    nominal tip or covariance of the pen, a `UsageError` is raised.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
-        text = json_text(pen, parent_sha256)
+        text = json_text(pen)
     elif suffix == ".csv":
         extras = pen.nominal_tip, pen.led_covariance, pen.normal_covariance
         if pen.name or any(each is not None for each in extras):

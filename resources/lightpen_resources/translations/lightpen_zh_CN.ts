@@ -1333,14 +1333,6 @@
         <translation>1 条记录</translation>
     </message>
     <message>
-        <source>Open the files of camera and LEDs first.</source>
-        <translation>请先打开内参文件和 LED 文件。</translation>
-    </message>
-    <message>
-        <source>Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with the old file {4} px.</source>
-        <translation>已保存到 {0}：{1} 和 {2}。留出的摆动的残差：{3} px，用旧文件时为 {4} px。</translation>
-    </message>
-    <message>
         <source>Saved in {0}</source>
         <translation>已保存到 {0}</translation>
     </message>
@@ -4022,10 +4014,6 @@ needed</source>
 <context>
     <name>SelectionPanel</name>
     <message>
-        <source>To adjust together, select {0} or more calibrations.</source>
-        <translation>联合平差需选择 {0} 个或更多标定。</translation>
-    </message>
-    <message>
         <source>Select two entries with a tip to compare them.</source>
         <translation>选择两个带测头数据的条目即可比较。</translation>
     </message>
@@ -4068,14 +4056,6 @@ needed</source>
     <message>
         <source>Repeatability needs two calibrations of one tip.</source>
         <translation>重复性至少需要同一测头的两次标定。</translation>
-    </message>
-    <message>
-        <source>Adjust together</source>
-        <translation>联合平差</translation>
-    </message>
-    <message>
-        <source>LED file and intrinsics file by all selected swings of a pen</source>
-        <translation>用同一光笔的所选全部摆动求 LED 文件和内参文件</translation>
     </message>
     <message>
         <source>Repeatability report...</source>
@@ -6090,10 +6070,6 @@ needed</source>
         <translation>摆动：最少图像数</translation>
     </message>
     <message>
-        <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation, all with one camera and the same files of camera and LEDs.</source>
-        <translation>可用的摆动：{n_swings} 次。合并需要 {needed} 次，另需一次用于确认；须全部使用一台相机以及相同的内参文件和 LED 文件。</translation>
-    </message>
-    <message>
         <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera.</source>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
@@ -7674,10 +7650,6 @@ needed</source>
         <translation>LED {led} 距原点 {distance:.6g} m，对光笔而言不合理。请检查数值及其单位。</translation>
     </message>
     <message>
-        <source>LED {led} moved by {distance:.3f} mm between the swings {first} and {swing}; no LED file fits both. Give only later swings.</source>
-        <translation>在 {first} 与 {swing} 两次摆动之间，LED {led} 移动了 {distance:.3f} mm：没有一个 LED 文件对两者都正确。请只给出移动之后的摆动。</translation>
-    </message>
-    <message>
         <source>LED {led} moved by {distance:.3f} mm relative to the others according to {swing}: it was knocked or is loose.</source>
         <translation>据 {swing}，LED {led} 相对其他 LED 移动了 {distance:.3f} mm：它被碰弯、碰撞或松动。</translation>
     </message>
@@ -8510,14 +8482,6 @@ needed</source>
         <translation>{folder} 中的摆动在计算测头后有变化。请重新计算，然后接受。</translation>
     </message>
     <message>
-        <source>The swing {swing} contradicts the others by {times:.0f} standard deviations. Check that pen, zoom and focus were the same in all swings.</source>
-        <translation>摆动 {swing} 与其他摆动相差 {times:.0f} 倍标准差。请检查各次摆动的光笔、变焦和对焦是否相同。</translation>
-    </message>
-    <message>
-        <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
-        <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
-    </message>
-    <message>
         <source>The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.</source>
         <translation>光笔温度未测量，而本工位要求测量。请测量并在“开始”页输入，然后重新摆动。</translation>
     </message>
@@ -8908,10 +8872,6 @@ needed</source>
     <message>
         <source>length</source>
         <translation>长度</translation>
-    </message>
-    <message>
-        <source>length verification</source>
-        <translation>长度验证记录</translation>
     </message>
     <message>
         <source>limits file</source>

@@ -1,6 +1,5 @@
 """What is concluded from the figures of calibrations, whatever they came from."""
 
-from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,14 +8,6 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.led_file import (
-    _is_better,
-    _Joint,
-    _of_images,
-    _require_agreement,
-    _require_unchanged,
-    improve_pen,
-)
 from lightpen.comparisons.pen_health import PenHealth, _without_move, examine_pen
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.reports.verdict import Grade
@@ -92,13 +83,6 @@ def test_an_led_has_moved_from_two_hundredths_on(
 
     assert found.moved == moved
     assert found.assessment.grade is (Grade.REPEAT if moved else Grade.STEADY)
-    with pytest.raises(CalibrationError) if moved else nullcontext() as refused:
-        _require_unchanged([swing(1), swing(2, one_led(by))], PEN)
-    if refused is not None:
-        said = refused.value.message.values
-        assert (said["led"], said["swing"]) == (4, "swing 2.json")
-        assert said["first"] == "swing 1.json"
-        assert said["distance"] == pytest.approx(by)
 
 
 def test_an_led_that_moved_stands_out_five_times() -> None:
@@ -215,90 +199,3 @@ def test_one_swing_or_two_pens_are_refused() -> None:
     assert (said["first"], said["other"]) == ("swing 1.json", "swing 3.json")
     with pytest.raises(UsageError):
         examined(swing(1, pen="other"), swing(2), swing(3, pen="other"))
-
-
-@pytest.mark.parametrize(
-    ("must_gain", "n_swings", "needed"), [(True, 3, 3), (False, 2, 2)]
-)
-def test_so_many_swings_are_pooled_beside_the_one_that_confirms(
-    must_gain: bool, n_swings: int, needed: int
-) -> None:
-    swings = [swing(i) for i in range(n_swings)]
-    with pytest.raises(CalibrationError) as refused:
-        improve_pen(swings, CAMERA, PEN, must_gain=must_gain)
-
-    said = refused.value.message.values
-    assert (said["n_swings"], said["needed"]) == (n_swings, needed)
-
-
-@pytest.mark.parametrize(("by", "is_better"), [(0.99, False), (1.01, True)])
-def test_images_fit_better_by_more_than_one_chance_in_a_hundred(
-    by: float, is_better: bool
-) -> None:
-    rng = np.random.default_rng(2)
-    scatter = rng.standard_normal(40)
-    scatter = (scatter - scatter.mean()) / scatter.std(ddof=1)
-    gains = scatter + by * 2.326348 / np.sqrt(40)  # of the squares of an image
-    residuals = rng.uniform(1, 2, (40, 5, 2))
-    residuals /= np.linalg.norm(residuals, axis=(1, 2))[:, None, None]
-    used = np.ones((40, 5), bool)
-    before, after = (
-        SimpleNamespace(residuals=np.sqrt(square)[:, None, None] * residuals, used=used)
-        for square in (10 + gains, np.full(40, 10.0))
-    )
-    fits: list[Any] = [before, after]
-    assert _is_better(*fits) == is_better
-    # What only one of both used does not count.
-    before.used = used & (np.arange(5) > 0)
-    residuals_of_first = np.where(np.arange(5)[:, None] == 0, 1e3, before.residuals)
-    more = SimpleNamespace(residuals=residuals_of_first, used=before.used)
-    same: list[Any] = [more, SimpleNamespace(residuals=residuals_of_first, used=used)]
-    assert not _is_better(*same)
-
-
-LAYOUT = SimpleNamespace(
-    cameras=(slice(1, 3),),
-    extrinsics=slice(3, 3),
-    diameter=slice(3, 4),
-    scale=slice(5, 6),
-    leds=slice(6, 8),
-)
-COMMON = np.array([1, 2, 3, 5, 6, 7])
-
-
-@pytest.mark.parametrize(("by", "contradicts"), [(3.99, False), (4.01, True)])
-@pytest.mark.parametrize("at", range(6))
-def test_a_swing_contradicts_the_others_from_four_deviations_on(
-    by: float, contradicts: bool, at: int
-) -> None:
-    of_swing, of_others = np.linspace(1, 2, 8), np.linspace(3, 2, 6)
-    off = by * np.sqrt(of_swing[COMMON][at] ** 2 + of_others[at] ** 2)
-    values = np.arange(8.0)
-    joint = _Joint(
-        PEN, CAMERA, values[COMMON] + off * np.eye(6)[at], np.diag(of_others**2)
-    )
-    bundle: Any = SimpleNamespace(
-        layout=LAYOUT, values=values, covariance=np.diag(of_swing**2)
-    )
-    if not contradicts:
-        _require_agreement(joint, bundle, "swing")
-        return
-    with pytest.raises(CalibrationError) as refused:
-        _require_agreement(joint, bundle, "swing")
-    assert refused.value.message.values["times"] == pytest.approx(by)
-
-
-def test_the_information_of_a_swing_on_what_is_shared_is_that_of_the_marginal() -> None:
-    rng = np.random.default_rng(3)
-    A = rng.standard_normal((12, 8))
-    prior, values = np.diag(rng.uniform(1, 2, 8)), rng.standard_normal(8)
-    bundle: Any = SimpleNamespace(
-        layout=LAYOUT, information=A.T @ A, prior_information=prior, values=values
-    )
-
-    information, right = _of_images(bundle)
-
-    at = np.ix_(COMMON, COMMON)
-    by_both = np.linalg.inv(np.linalg.inv(A.T @ A + prior)[at])
-    np.testing.assert_allclose(information, by_both - prior[at], atol=1e-9)
-    np.testing.assert_allclose(by_both @ values[COMMON], right, atol=1e-9)

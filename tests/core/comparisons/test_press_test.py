@@ -10,7 +10,7 @@ import pytest
 from benchmarks.station import GOOD, _drawn_pen, drawn_rig
 from msgspec.structs import replace as replace_struct
 
-from lightpen.comparisons.pen_over_time import press_test
+from lightpen.comparisons.press_test import press_test
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.verdict import Grade

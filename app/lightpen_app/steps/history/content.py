@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,7 +11,6 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from lightpen.archive.chains import Kind, StoredEntry
 from lightpen.archive.checks import ArchiveCheckResult
 from lightpen.archive.history import EntryFilter, Line
-from lightpen.comparisons.pen_over_time import NewLedFile, adjust_together
 from lightpen.comparisons.records import repeatability_entries, verification_record
 from lightpen.comparisons.repeatability import Repeatability, Trend
 from lightpen.formats.opened_files import InputFile
@@ -20,10 +18,8 @@ from lightpen.formats.own_json import file_entry
 from lightpen.model.limits import DueRule, VerificationLimits, rule_in_words
 from lightpen.model.names import Origin
 from lightpen.record.folder import attributed, keep_verification
-from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.words import number_text
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.history.archive_panel import (
     NOTICE,
@@ -36,9 +32,8 @@ from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
 from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
-from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.widgets.trend_panel import TrendPanel
-from lightpen_app.work.job import Job, LatestJob, Report
+from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
 
@@ -88,7 +83,6 @@ class HistoryContent(Translated, QWidget):
         self._print_report = PrintReportControl(workbench.save_place, self)
         self._trend = Trend()
         self._followed: EntryFilter | None = None  # whose trend it is
-        self._adjusting = LatestJob(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self._filter = FilterBar()
@@ -136,8 +130,6 @@ class HistoryContent(Translated, QWidget):
         self._entry.report_requested.connect(self._show_report)
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
-        self._selection.adjust_requested.connect(self._adjust_together)
-        self._selection.adjusting.cancelled.connect(self._adjusting.cancel)
         self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
@@ -232,42 +224,6 @@ class HistoryContent(Translated, QWidget):
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._chosen.set_due_rule(rule)
         self._reader.read_due(rule, self._tips.library)
-
-    # Joint results of several swings
-
-    def _adjust_together(self) -> None:
-        results = (each.entry.event.result for each in self._selection.selected())
-        chosen = {self._folder / each.place for each in results if each is not None}
-        archive, now = FolderArchive(self._folder), self._now()
-        prepared = self._chosen.preparation
-        if prepared.pen_file is None or prepared.camera_file is None:
-            self._on_not_adjusted(self.tr("Open the files of camera and LEDs first."))
-            return
-        progress = self._selection.adjusting
-        progress.begin()
-        self._adjusting.start(
-            partial(adjust_together, archive, prepared, chosen, now),
-            self._on_adjusted,
-            self._on_not_adjusted,
-            progressed=progress.set_fraction,
-            ended=progress.end,
-        )
-
-    def _on_adjusted(self, new: NewLedFile) -> None:
-        improved = new.improved
-        words = self.tr(
-            "Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with "
-            "the old file {4} px."
-        ).format(
-            new.path.parent,
-            new.path.name,
-            new.camera_path.name,
-            *(number_text(x, 4) for x in (improved.sigma_after, improved.sigma_before)),
-        )
-        self._selection.set_adjusted(StatusMessage.good(words))
-
-    def _on_not_adjusted(self, why: str) -> None:
-        self._selection.set_adjusted(StatusMessage.fault(why))
 
     # What is entered
 

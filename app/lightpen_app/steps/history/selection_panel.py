@@ -9,7 +9,6 @@ from typing_extensions import override
 
 from lightpen.archive.chains import StoredEntry
 from lightpen.archive.history import DueTip
-from lightpen.comparisons.led_file import MIN_JOINT
 from lightpen.comparisons.repeatability import (
     Comparison,
     Repeatability,
@@ -34,8 +33,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.phrases import GRADE_MARKS
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.words import (
     AXES,
     LEAST_SHOWN,
@@ -46,7 +44,6 @@ from lightpen_app.look.words import (
     set_tooltip,
     shortened,
 )
-from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import ResponsiveLayout
 from lightpen_app.widgets.number_field import NumberField
@@ -63,8 +60,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
     """
 
     narrow_below = 110 * GRID  # px; then the comparison is above the repeatability
-    # Improved LED and camera files from the selected swings are requested.
-    adjust_requested = Signal()
     report_requested = Signal()  # show the repeatability report
 
     def __init__(self) -> None:
@@ -77,13 +72,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         self._compared, self._scattered = NumberTable(), NumberTable()
         self._change, self._verdict = SignLabel(), SignLabel()
         self._limits = VerificationLimits()
-        self._adjust = self.make_button(
-            self.tr("Adjust together"),
-            self.adjust_requested,
-            tip=self.tr("LED file and intrinsics file by all selected swings of a pen"),
-        )
-        self._adjusted = SignLabel()
-        self.adjusting = JobProgress()
         self._report = self.make_button(
             self.tr("Repeatability report..."), self.report_requested
         )
@@ -99,8 +87,7 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         )
         for side in sides:
             vertical_layout(self._sides, *side, 1, spacing=GRID // 2, stretch=1)
-        horizontal_layout(layout, self._adjust, (self._adjusted, 1))
-        horizontal_layout(layout, self._report, (self.adjusting, 1), 0)
+        horizontal_layout(layout, self._report, 1)
         layout.addStretch(1)
 
         self._retranslate()
@@ -125,14 +112,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         self._trend = trend
         self._retranslate()
 
-    def selected(self) -> tuple[StoredEntry, ...]:
-        """Return the selected entries with a tip."""
-        return self._selected
-
-    def set_adjusted(self, message: StatusMessage) -> None:
-        """Show the result of the adjustment of the selected swings."""
-        self._adjusted.set_value(message)
-
     def comparison(self) -> Comparison | None:
         """Return the comparison; None unless two tips are selected."""
         return compare(*self._selected) if len(self._selected) == PAIR else None
@@ -146,13 +125,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         return self._selected if len(self._selected) >= PAIR else self._trend.entries
 
     def _retranslate(self) -> None:
-        too_few = self.tr(
-            "To adjust together, select {0} or more calibrations."
-        ).format(MIN_JOINT + 1)
-        why_not = too_few if len(self._selected) <= MIN_JOINT else ""
-        self._adjust.set_why_not(why_not)
-        if why_not or self._adjusted.value().sign is Sign.RING:
-            self._adjusted.set_value(StatusMessage(why_not, Sign.RING, Tone.QUIET))
         needed = self.tr("Repeatability needs two calibrations of one tip.")
         self._report.set_why_not("" if self.repeatability() else needed)
         self._show_comparison(self.comparison())

@@ -24,7 +24,7 @@ from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
-    from lightpen.comparisons.pen_over_time import PressTest
+    from lightpen.comparisons.press_test import PressTest
 
 
 class AcceptanceControl(QObject):
@@ -128,7 +128,7 @@ class PressTestControl(QObject):
         one, other = light.calibration, firm.calibration
 
         def compared(_: Report) -> "PressTest":
-            from lightpen.comparisons.pen_over_time import press_test
+            from lightpen.comparisons.press_test import press_test
 
             return press_test(one, other)
 

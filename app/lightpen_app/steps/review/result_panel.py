@@ -34,7 +34,7 @@ from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
 
 if TYPE_CHECKING:
-    from lightpen.comparisons.pen_over_time import PressTest
+    from lightpen.comparisons.press_test import PressTest
 
 
 @dataclass(frozen=True)

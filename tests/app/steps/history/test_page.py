@@ -25,7 +25,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
-from tests.accepted_tip import accept_tip
 from tests.app.room import scrolled_sideways
 from typing_extensions import override
 
@@ -41,9 +40,6 @@ from lightpen.comparisons.assessment import (
 )
 from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.names import Origin
 from lightpen.record.folder import keep_verification
@@ -54,7 +50,6 @@ from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import Names
-from lightpen.swing.preparation import Preparation
 from lightpen_app.face import Service
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
@@ -77,16 +72,12 @@ from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
 from lightpen_app.widgets.fields import DateField
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.plant.server import Replicator
-from lightpen_extensions.simulator.scene_files import write_sample_files
-from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_resources import languages
 
 if TYPE_CHECKING:
@@ -476,56 +467,6 @@ def files_in(folder: Path) -> dict[Path, int]:
     """Return the files in a folder with their sizes."""
     found = (each for each in folder.rglob("*") if each.is_file())
     return {each: each.stat().st_size for each in found}
-
-
-@pytest.mark.slow
-def test_several_swings_are_adjusted_together(
-    desk: Desk, tmp_path: Path, hold_back: "HoldBack"
-) -> None:
-    folder, scene = desk.workbench.folder, Scene(camera=paper_camera(binning=2))
-    files = write_sample_files(scene, tmp_path / "files")
-    prepared = Preparation(
-        names=names("T-10"),
-        camera_file=CameraFile.read(files.camera),
-        pen_file=PenFile.read(files.pen),
-        image_size=scene.camera.image_size,
-    )
-    for seed in range(1, 4):
-        accept_tip(folder, prepared, seed, led_error=0.01)
-    desk.workbench.selection.set_preparation(prepared)
-    desk.workbench.run.logbook.enter_owed()
-    desk.open()
-    desk.show_tab(SELECTION)
-    panel = desk.child(SelectionPanel)
-    desk.select(0, 1)
-    assert not desk.button("Adjust together").isEnabled()
-    remark = panel.findChildren(SignLabel)[-1]
-    assert remark.value().text == "To adjust together, select 3 or more calibrations."
-    desk.select(0, 1, 2)
-    assert not remark.value().text
-    before = files_in(folder)
-    for begins_at in "calibrate_again", "_pooled":  # a swing; all together, the longest
-        may_begin = hold_back(f"lightpen.comparisons.led_file.{begins_at}")
-        desk.click("Adjust together")
-        desk.until(may_begin.is_reached.is_set)
-        desk.click("Cancel")
-        may_begin.set()
-        QThreadPool.globalInstance().waitForDone()
-        QApplication.processEvents()
-        assert not remark.value().text
-        assert not panel.adjusting.is_running
-        assert files_in(folder) == before
-
-    desk.click("Adjust together")
-    desk.until(lambda: "Residuals of the swing held out" in remark.value().text)
-
-    (camera,) = folder.rglob("led files/*.yaml")
-    (leds,) = folder.rglob("led files/*.json")
-    refined = read_camera(camera)
-    assert refined.covariance is not None
-    assert read_pen(leds).led_covariance is not None
-    sigma = float(refined.covariance[0, 0]) ** 0.5
-    assert abs(refined.fx - scene.camera.fx) < 4 * sigma
 
 
 @pytest.mark.slow

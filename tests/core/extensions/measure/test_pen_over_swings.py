@@ -1,19 +1,15 @@
-"""Tests of `lightpen.comparisons.pen_health` and `led_file`."""
+"""Tests of `lightpen.comparisons.pen_health`."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from msgspec import structs
 from tests.simulated_sessions import recorded
 
-from lightpen.comparisons.assessment import Scale
-from lightpen.comparisons.led_file import _is_better, improve_pen
 from lightpen.comparisons.pen_health import examine_pen
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
@@ -22,10 +18,8 @@ from lightpen.estimation.reports.calibration_record import ContradictionRecord
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.own_json import FileRecord
-from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
-from lightpen.model.self_calibration import EXACT_SCALE, FoundPen, marks_of
-from lightpen.record.calibrations import CalibrationFile, shown_images
+from lightpen.record.calibrations import CalibrationFile
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -149,155 +143,3 @@ def test_one_swing_and_swings_of_two_pens_are_refused(swing: Swing) -> None:
     of_other_pen = replace(other, calibration=record)
     with pytest.raises(UsageError, match=r"swing 2\.json was calibrated with another"):
         examine_pen([one, of_other_pen], paper_camera(), PEN_FILE.leds)
-
-
-def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> None:
-    pen = true_pen()
-    swings = [swing(pen, number) for number in (1, 2, 3, 4)]
-
-    done = list[float]()
-
-    found = improve_pen(swings, paper_camera(), PEN_FILE, report=done.append)
-
-    assert done == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
-
-    def errors(leds: np.ndarray) -> np.ndarray:
-        """Errors but for those of the frame, by the differences between LEDs."""
-        found = np.linalg.norm(leds[:, None] - leds, axis=2)
-        true = np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2)
-        return np.asarray(found - true)
-
-    before, after = errors(PEN_FILE.leds), errors(found.pen.leds)
-    assert np.sqrt(np.mean(after**2)) < 0.3 * np.sqrt(np.mean(before**2))
-    assert found.sigma_after < found.sigma_before
-    assert found.held_out == "swing 4.json"
-    write_pen(found.pen, tmp_path / "new.json", "a" * 64)
-    read = read_pen(tmp_path / "new.json")
-    np.testing.assert_array_equal(read.leds, found.pen.leds)
-    assert read.led_covariance is not None
-    assert found.pen.led_covariance is not None
-    np.testing.assert_array_equal(read.led_covariance, found.pen.led_covariance)
-    assert '"parent_sha256": "aaaa' in (tmp_path / "new.json").read_text()
-
-
-@pytest.mark.slow
-def test_pooled_swings_put_the_camera_file_right(swing: Swing) -> None:
-    true = paper_camera()
-    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    off = replace(true, fx=1.001 * true.fx, fy=1.001 * true.fy)
-
-    found = improve_pen(swings, off, PEN_FILE).camera
-
-    assert found.covariance is not None
-    sigma = np.sqrt(np.diag(found.covariance))[:2]
-    error = np.array([found.fx - true.fx, found.fy - true.fy])
-    assert (np.abs(error) < 3 * sigma).all()
-    assert np.abs(error).max() < 0.5 * (off.fx - true.fx)
-
-
-def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    scale = Scale(1.0003, 1e-5, 1e-2)
-
-    found = improve_pen(
-        swings, paper_camera(), replace(PEN_FILE, scale_sigma=5e-3), scale
-    )
-
-    assert found.pen.scale_sigma == pytest.approx(5e-6, rel=0.1)
-    extents = np.ptp(found.pen.leds[:4, 1]) / np.ptp(PEN_FILE.leds[:4, 1])
-    # The LEDs at the ends of the pen are off by 0.01 mm in the file, of 180 mm.
-    assert extents - 1 == pytest.approx(3e-4, abs=1e-4)
-
-
-def test_what_no_swing_shows_stays_as_uncertain_as_the_file_states(
-    swing: Swing,
-) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    scaling = (PEN_FILE.leds - PEN_FILE.leds.mean(axis=0)).ravel()
-    known = 1e-4 * np.eye(len(scaling)) + 1e-6 * np.outer(scaling, scaling)
-    stated = replace(
-        PEN_FILE, led_sigma=None, scale_sigma=1e-6, expansion=0.0, led_covariance=known
-    )
-
-    found = improve_pen(swings, paper_camera(), stated)
-
-    assert found.pen.led_covariance is not None
-    unit = scaling / (scaling @ scaling)
-    scale = np.sqrt(unit @ found.pen.led_covariance @ unit)
-    assert scale == pytest.approx(1e-3, rel=0.1)
-    of_shape = np.diag(found.pen.led_covariance) - (scale * scaling) ** 2
-    assert of_shape.max() < 0.005**2
-
-
-@pytest.mark.slow
-def test_the_swing_that_the_file_was_found_from_counts_once(swing: Swing) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3)]
-    marks = [marks_of(shown_images(each.calibration).pixels) for each in swings]
-    before = FoundPen(marks[0], PEN_FILE.diameter, 0.05**2 * np.eye(PEN_FILE.leds.size))
-    wide = replace(PEN_FILE, led_sigma=None, led_covariance=before.led_covariance)
-    wide = replace(wide, scale_sigma=EXACT_SCALE, expansion=0.0)
-    exact = replace(wide, led_covariance=1e-8 * before.led_covariance, found=before)
-
-    by_exact, by_wide = (
-        improve_pen(swings, paper_camera(), each, must_gain=False).pen
-        for each in (exact, wide)
-    )
-
-    np.testing.assert_allclose(by_exact.leds, by_wide.leds, atol=1e-6)
-    assert by_exact.led_covariance is not None
-    assert by_wide.led_covariance is not None
-    np.testing.assert_allclose(
-        by_exact.led_covariance, by_wide.led_covariance, rtol=0.01, atol=1e-9
-    )
-    assert by_exact.found is not None
-    np.testing.assert_array_equal(
-        by_exact.found.marks, np.concatenate([marks[0], *marks[:2]])
-    )
-
-
-def test_a_swing_held_out_that_contradicts_the_others_is_named(swing: Swing) -> None:
-    pen = true_pen()
-    leds = pen.leds.copy()
-    leds[6, 0] += 0.013  # less than what is called a move
-    swings = [swing(pen, 1), swing(pen, 2), swing(replace(pen, leds=leds), 3)]
-
-    with pytest.raises(CalibrationError, match=r"swing 3\.json contradicts the others"):
-        improve_pen(swings, paper_camera(), PEN_FILE, must_gain=False)
-
-
-@pytest.mark.slow
-def test_a_swing_of_another_state_of_the_pen_does_not_confirm(swing: Swing) -> None:
-    pen = true_pen()
-    swings = [swing(with_moved_led(pen), number) for number in (1, 2, 3)]
-
-    with pytest.raises(CalibrationError, match="does not confirm the new LED file"):
-        improve_pen([*swings, swing(paper_pen(), 4)], paper_camera(), PEN_FILE)
-
-
-def test_swings_of_before_and_after_a_knock_are_not_pooled(swing: Swing) -> None:
-    pen = true_pen()
-    swings = [
-        swing(each, number)
-        for number, each in enumerate([pen, *[with_moved_led(pen)] * 3], start=1)
-    ]
-
-    with pytest.raises(CalibrationError, match=r"swing 1\.json and swing 2\.json"):
-        improve_pen(swings, paper_camera(), PEN_FILE)
-
-
-def test_a_fit_is_better_by_the_size_of_its_residuals_whatever_their_sign() -> None:
-    def fit(size: float, sign: int) -> Any:
-        residuals = np.random.default_rng(3).uniform(0.5, 1.0, (N_IMAGES, 8, 2))
-        used = np.ones(residuals.shape[:2], dtype=bool)
-        return SimpleNamespace(used=used, residuals=sign * size * residuals)
-
-    for sign in (1, -1):
-        assert _is_better(fit(2.0, sign), fit(1.0, sign))
-        assert not _is_better(fit(1.0, sign), fit(2.0, sign))
-
-
-def test_too_few_swings_are_refused(swing: Swing) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3)]
-
-    with pytest.raises(CalibrationError, match="Swings given: 3"):
-        improve_pen(swings, paper_camera(), PEN_FILE)

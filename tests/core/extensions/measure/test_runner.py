@@ -12,7 +12,6 @@ from tests.verifying import BAR, CHOICES, NOON, PART_CHOICES, TIMEOUT, Verifier
 
 from lightpen.archive.checks import check_archive
 from lightpen.archive.logbook import Logbook
-from lightpen.comparisons.assessment import read_scale
 from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
@@ -107,7 +106,8 @@ def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*round_a_ring(11, 31.751)[:10], *BAR)
     part, _ = at_it.status.files
 
-    assert read_scale(part).factor == pytest.approx(1.0, abs=1e-3)
+    scale = json.loads(part.read_text())["scale"]
+    assert scale["factor"] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_cannot_be_kept_is_reported_and_kept_later(at_it: Verifier) -> None:

@@ -3,15 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VERIFY_AGAIN, check
-from lightpen.comparisons.led_file import ImprovedPen
 from lightpen.comparisons.pen_health import Growth, PenHealth, SwingOfPen
-from lightpen.comparisons.pen_over_time import PressTest
+from lightpen.comparisons.press_test import PressTest
 from lightpen.comparisons.records import (
-    improved_pen_text,
     pen_health_entries,
     pen_health_text,
     press_test_text,
@@ -27,12 +23,7 @@ from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen_extensions.measure.commands.measure import found_text, touches_text
 from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, RejectedFrame
-from lightpen_extensions.simulator.swings import (
-    PAPER_CONE,
-    PAPER_TIP,
-    paper_camera,
-    paper_pen,
-)
+from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 RULE = rule_in_words(VerificationLimits())
 DOUBT = check(message("drift.too-few"), VERIFY_AGAIN)
@@ -126,24 +117,6 @@ def test_a_pen_shows_the_move_of_each_led_and_its_growth() -> None:
     assert entries["growth"] == 1.26e-4
     assert entries["growth_expanded_uncertainty"] == 2e-5
     assert [each["growth"] for each in entries["swings"]] == [None, 1.26e-4]
-
-
-@pytest.mark.parametrize(("scale", "ppm"), [(2.5e-6, "2.5"), (None, "0.0")])
-def test_an_improved_pen_shows_its_new_leds_and_what_confirms_them(
-    scale: float | None, ppm: str
-) -> None:
-    pen = replace(paper_pen(), led_sigma=0.0012, scale_sigma=scale)
-    moves: FloatArray = np.arange(30.0).reshape(10, 3) / 1000
-    found = ImprovedPen(pen, paper_camera(), moves, ("a", "b"), "c", 0.0234, 0.0198)
-
-    lines = improved_pen_text(found).splitlines()
-
-    assert lines[1] == "LED  " + "".join(f"{axis:>10}" for axis in "xyzxyz")
-    for i, line in enumerate(lines[2 : 2 + pen.n_leds]):
-        cells = "".join(f"{x:>10.4f}" for x in (*pen.leds[i], *moves[i]))
-        assert line == f"{i + 1:<5}{cells}"
-    assert f"known to 0.00120 mm, the scale to {ppm} ppm (k = 1), by a, b." in lines[-2]
-    assert lines[-1].startswith("c confirms it: residuals of 0.0198 px, 0.0234 px")
 
 
 def repeated(n_tips: int, *, has_control: bool) -> Repeatability:
