@@ -131,9 +131,6 @@ _LACKS: dict[MissingInput, str] = {
         "of these cameras.",
     ),
     MissingInput.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
-    MissingInput.SAVED_LEDS: QT_TRANSLATE_NOOP(
-        "phrases", "The LED table has unsaved changes. Save or discard them."
-    ),
 }
 # A word for a sign to stand beside, read from a distance.
 _PHASES: dict[Phase, str] = {

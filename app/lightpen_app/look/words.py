@@ -153,19 +153,8 @@ def unit_size(typed: str, unit: str) -> float | None:
     return None
 
 
-def in_unit(text: str, unit: str) -> str:
-    """Return a typed length in ``unit``, as 0.02 of "20 um"; else what was typed."""
-    match = TYPED.fullmatch(text.strip())
-    size = match and match["unit"] and unit_size(match["unit"], unit)
-    if not match or not size:
-        return text.strip()
-    value = float(match["number"].replace(",", ".")) * size
-    return f"{value:.{TYPED_DECIMALS}f}".rstrip("0").rstrip(".")
-
-
 translate = QCoreApplication.translate
 
-TYPED_DECIMALS = 6  # of a length in mm that was typed in another unit
 LEAST_S, LEAST_FRACTION = 2.0, 0.02  # after which the rate is known
 LONG_S = 90.0  # shown in minutes
 

@@ -103,7 +103,6 @@ class MissingInput(StrEnum):
     RIG_OF_TWO = "rig of two"
     SECOND_IMAGE_SIZE = "second image size"
     PEN_FILE = "pen file"
-    SAVED_LEDS = "saved leds"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,6 @@ class Preparation:
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     method: Method = "joint"  # of the reported tip
-    has_unsaved_leds: bool = False  # edited or opened ones, not of the file in use
     second: SecondCamera | None = None  # None for a single camera
     heading: float | None = None  # operator's right in the image, rad, once learnt
     temperature_day: str = ""  # ISO date of the temperature in the assumptions
@@ -354,11 +352,7 @@ class Preparation:
 
     def leds_missing_inputs(self) -> tuple[MissingInput, ...]:
         """Return the missing inputs of the step LEDs."""
-        missing_inputs = {
-            MissingInput.PEN_FILE: self.pen_file is None,
-            MissingInput.SAVED_LEDS: self.has_unsaved_leds,
-        }
-        return tuple(lack for lack, is_lacking in missing_inputs.items() if is_lacking)
+        return (MissingInput.PEN_FILE,) if self.pen_file is None else ()
 
     def missing_inputs(self) -> tuple[MissingInput, ...]:
         """Return all missing inputs."""

@@ -1242,58 +1242,6 @@
         <source>Pen and pen frame</source>
         <translation>光笔及光笔坐标系</translation>
     </message>
-    <message>
-        <source>Transform to pen frame</source>
-        <translation>转换到光笔坐标系</translation>
-    </message>
-    <message>
-        <source>The coordinates are in another frame, for example of a measuring machine.</source>
-        <translation>这些坐标属于其他坐标系，例如测量机坐标系。</translation>
-    </message>
-    <message>
-        <source>Other layout than the ten-LED pen; the frame of the file is used as is.</source>
-        <translation>不是十 LED 光笔的布局；直接采用文件的坐标系。</translation>
-    </message>
-    <message>
-        <source>fulfilled</source>
-        <translation>满足</translation>
-    </message>
-    <message>
-        <source>not fulfilled</source>
-        <translation>不满足</translation>
-    </message>
-    <message>
-        <source>LED spacing</source>
-        <translation>LED 间距</translation>
-    </message>
-    <message>
-        <source>LED numbering</source>
-        <translation>LED 编号顺序</translation>
-    </message>
-    <message>
-        <source>LEDs 1-4 on a line</source>
-        <translation>LED 1-4 共线</translation>
-    </message>
-    <message>
-        <source>LED 1 at x = y = 0</source>
-        <translation>LED 1 位于 x = y = 0</translation>
-    </message>
-    <message>
-        <source>y axis along LEDs 1-4</source>
-        <translation>y 轴沿 LED 1-4</translation>
-    </message>
-    <message>
-        <source>LEDs 5-10 at z = 0</source>
-        <translation>LED 5-10 位于 z = 0</translation>
-    </message>
-    <message>
-        <source>Right-handed axes</source>
-        <translation>右手坐标系</translation>
-    </message>
-    <message>
-        <source>Discs facing the viewer</source>
-        <translation>发光面朝向观察者</translation>
-    </message>
 </context>
 <context>
     <name>HelpWindow</name>
@@ -2015,8 +1963,12 @@
 <context>
     <name>LedFileControl</name>
     <message>
-        <source>Discard changes</source>
-        <translation>放弃修改</translation>
+        <source>Save the corrected LEDs</source>
+        <translation>保存改正后的 LED</translation>
+    </message>
+    <message>
+        <source>{0} corrected</source>
+        <translation>{0} 已改正</translation>
     </message>
     <message>
         <source>{0} Use it for this pen from now on?</source>
@@ -2038,6 +1990,10 @@
 <context>
     <name>LedFilePanel</name>
     <message>
+        <source>Unit of the file</source>
+        <translation>文件的单位</translation>
+    </message>
+    <message>
         <source>Cancel</source>
         <translation>取消</translation>
     </message>
@@ -2050,28 +2006,8 @@
         <translation>光笔 LED 文件 ({0})</translation>
     </message>
     <message>
-        <source>Tables ({0})</source>
-        <translation>表格 ({0})</translation>
-    </message>
-    <message>
-        <source>With name and nominal tip ({0})</source>
-        <translation>含名称和标称测头 ({0})</translation>
-    </message>
-    <message>
-        <source>Swap {0} and {1}</source>
-        <translation>交换 {0} 和 {1}</translation>
-    </message>
-    <message>
-        <source>Save LEDs</source>
-        <translation>保存 LED</translation>
-    </message>
-    <message>
-        <source>{0} already exists. Replace it with these LEDs?</source>
-        <translation>{0} 已存在。用这些 LED 替换它吗？</translation>
-    </message>
-    <message>
-        <source>Replace</source>
-        <translation>替换</translation>
+        <source>{0} does not state the unit of its coordinates. Choose it:</source>
+        <translation>{0} 未注明坐标单位。请选择：</translation>
     </message>
     <message>
         <source>LED &amp;file</source>
@@ -2090,10 +2026,6 @@
         <translation>打开...</translation>
     </message>
     <message>
-        <source>Save as...</source>
-        <translation>另存为...</translation>
-    </message>
-    <message>
         <source>Use file of the simulated pen</source>
         <translation>使用模拟光笔的文件</translation>
     </message>
@@ -2104,10 +2036,6 @@
     <message>
         <source>Find pen, camera and tip by one swing and one length.</source>
         <translation>由一次摆动和一个长度求光笔、相机和测头。</translation>
-    </message>
-    <message>
-        <source>Save the LEDs and use the saved file</source>
-        <translation>保存 LED 并使用该文件</translation>
     </message>
 </context>
 <context>
@@ -2135,80 +2063,36 @@
         <source>LED coordinates</source>
         <translation>LED 坐标</translation>
     </message>
+    <message>
+        <source>LED</source>
+        <translation>LED</translation>
+    </message>
+    <message>
+        <source>RMS / px</source>
+        <translation>RMS / px</translation>
+    </message>
+    <message>
+        <source>Distance between the detected LED and its table position in the live image / px</source>
+        <translation>实时图像中检测到的 LED 与表中位置之差 / px</translation>
+    </message>
 </context>
 <context>
     <name>LedTablePanel</name>
-    <message>
-        <source>A pen needs at least {0} LEDs.</source>
-        <translation>光笔至少需要 {0} 个 LED。</translation>
-    </message>
-    <message>
-        <source>LED coordinates (modified)</source>
-        <translation>LED 坐标（已修改）</translation>
-    </message>
     <message>
         <source>LED coordinates</source>
         <translation>LED 坐标</translation>
     </message>
     <message>
-        <source>Add an LED at the end</source>
-        <translation>在末尾添加一个 LED</translation>
+        <source>Disc Ø {0:g} mm</source>
+        <translation>圆盘 Ø {0:g} mm</translation>
     </message>
     <message>
-        <source>Select an LED in the table.</source>
-        <translation>请在表格中选择一个 LED。</translation>
-    </message>
-    <message>
-        <source>Remove LED {0}; the following LEDs are renumbered.</source>
-        <translation>删除 LED {0}；后面的 LED 重新编号。</translation>
-    </message>
-    <message>
-        <source>No changes</source>
-        <translation>没有修改</translation>
-    </message>
-    <message>
-        <source>Restore the coordinates of the file</source>
-        <translation>恢复文件中的坐标</translation>
-    </message>
-    <message>
-        <source>Restore the file in use</source>
-        <translation>恢复使用中的文件</translation>
+        <source>Nominal tip: {0} mm</source>
+        <translation>标称测头：{0} mm</translation>
     </message>
     <message>
         <source>Nominal tip in use (step Start): {0} mm</source>
         <translation>使用中的标称测头（“开始”步骤）：{0} mm</translation>
-    </message>
-    <message>
-        <source>Add</source>
-        <translation>添加</translation>
-    </message>
-    <message>
-        <source>Remove</source>
-        <translation>删除</translation>
-    </message>
-    <message>
-        <source>Discard</source>
-        <translation>放弃</translation>
-    </message>
-    <message>
-        <source>Show normals</source>
-        <translation>显示法线</translation>
-    </message>
-    <message>
-        <source>&amp;Disc Ø, mm</source>
-        <translation>发光面 Ø, mm(&amp;D)</translation>
-    </message>
-    <message>
-        <source>Diameter of the LED discs, mm</source>
-        <translation>LED 发光面直径，mm</translation>
-    </message>
-    <message>
-        <source>&amp;Tip x y z, mm</source>
-        <translation>测头 x y z, mm(&amp;T)</translation>
-    </message>
-    <message>
-        <source>Nominal tip centre, {0}, mm</source>
-        <translation>测头标称中心，{0}，mm</translation>
     </message>
 </context>
 <context>
@@ -2226,32 +2110,28 @@
         <translation>请打开本光笔的 LED 文件，并将光笔置于相机视野内。</translation>
     </message>
     <message>
+        <source>Swap {0} and {1}</source>
+        <translation>交换 {0} 和 {1}</translation>
+    </message>
+    <message>
+        <source>Transform to pen frame</source>
+        <translation>转换到光笔坐标系</translation>
+    </message>
+    <message>
+        <source>Other layout than the ten-LED pen; the frame of the file is used as is.</source>
+        <translation>不是十 LED 光笔的布局；直接采用文件的坐标系。</translation>
+    </message>
+    <message>
+        <source>The LEDs are in the pen frame.</source>
+        <translation>LED 在光笔坐标系中。</translation>
+    </message>
+    <message>
         <source>The swing will probably fail.</source>
         <translation>摆动很可能失败。</translation>
     </message>
     <message>
         <source>Swing anyway</source>
         <translation>仍然摆动</translation>
-    </message>
-    <message>
-        <source>The LED table has unsaved changes.</source>
-        <translation>LED 表格有未保存的修改。</translation>
-    </message>
-    <message>
-        <source>Correct the LED table first (see the message above).</source>
-        <translation>请先改正 LED 表格（见上方说明）。</translation>
-    </message>
-    <message>
-        <source>Save the LED table first; the record needs its file.</source>
-        <translation>请先保存 LED 表格；记录需要该文件。</translation>
-    </message>
-    <message>
-        <source>The table has no LEDs.</source>
-        <translation>表格中没有 LED。</translation>
-    </message>
-    <message>
-        <source>Correct the LEDs first; a file of these LEDs would be invalid.</source>
-        <translation>请先改正 LED；否则文件无效。</translation>
     </message>
     <message>
         <source>Continue to the swing</source>
@@ -2648,8 +2528,8 @@
         <translation>缺少内参文件。请看“相机”步骤。</translation>
     </message>
     <message>
-        <source>Enter or correct the LEDs first.</source>
-        <translation>请先输入或改正 LED。</translation>
+        <source>Open the LED file first.</source>
+        <translation>请先打开 LED 文件。</translation>
     </message>
 </context>
 <context>
@@ -5422,32 +5302,6 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>_DraftModel</name>
-    <message>
-        <source>Distance between the detected LED and its table position in the live image / px</source>
-        <translation>实时图像中检测到的 LED 与表中位置之差 / px</translation>
-    </message>
-    <message>
-        <source>LED</source>
-        <translation>LED</translation>
-    </message>
-    <message>
-        <source>RMS / px</source>
-        <translation>均方根/px</translation>
-    </message>
-</context>
-<context>
-    <name>_UnitsRow</name>
-    <message>
-        <source>{0} does not state the unit of its coordinates. Choose it:</source>
-        <translation>{0} 未注明坐标单位。请选择：</translation>
-    </message>
-    <message>
-        <source>Unit of the file</source>
-        <translation>文件的单位</translation>
-    </message>
-</context>
-<context>
     <name>core</name>
     <message>
         <source>({x:g}, {y:g}) px lies outside every image. Correct or remove the line.</source>
@@ -5544,10 +5398,6 @@ needed</source>
     <message>
         <source>Deviation</source>
         <translation>偏差</translation>
-    </message>
-    <message>
-        <source>Diameter of the discs: {flaw}</source>
-        <translation>发光面直径：{flaw}</translation>
     </message>
     <message>
         <source>Digital Calibration Certificate (XML)</source>
@@ -5700,14 +5550,6 @@ needed</source>
     <message>
         <source>LED {led} of {name} has no normal, but others have. Give the normals of all LEDs or of none.</source>
         <translation>{name} 的 LED {led} 没有法向量，而其他 LED 有。请给出全部法向量，或都不给。</translation>
-    </message>
-    <message>
-        <source>LED {led}, {column}: {flaw}</source>
-        <translation>LED {led}，{column}：{flaw}</translation>
-    </message>
-    <message>
-        <source>LED {led}: the normal {normal} does not have the length 1. Correct it; a disc that faces +z has the normal 0 0 1.</source>
-        <translation>LED {led}：法向量 {normal} 的长度不为 1。请改正；朝 +z 的发光面法向量为 0 0 1。</translation>
     </message>
     <message>
         <source>LEDs 1 to 4 must have negative z. Change the sign of all z.</source>
@@ -5872,10 +5714,6 @@ needed</source>
     <message>
         <source>Nominal</source>
         <translation>标称</translation>
-    </message>
-    <message>
-        <source>Nominal tip, {axis}: {flaw}</source>
-        <translation>标称测头，{axis}：{flaw}</translation>
     </message>
     <message>
         <source>Nominal tip: average</source>
@@ -10083,10 +9921,6 @@ needed</source>
     <message>
         <source>Open the LED geometry file.</source>
         <translation>请打开 LED 几何文件。</translation>
-    </message>
-    <message>
-        <source>The LED table has unsaved changes. Save or discard them.</source>
-        <translation>LED 表格有未保存的修改。请保存或放弃。</translation>
     </message>
     <message>
         <source>WAITING</source>

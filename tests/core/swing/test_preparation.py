@@ -124,14 +124,6 @@ def test_both_files_must_be_chosen(whole: Preparation) -> None:
     assert replace(whole, pen_file=None).missing_inputs() == (MissingInput.PEN_FILE,)
 
 
-def test_edited_leds_must_be_saved_or_discarded_before_a_swing(
-    whole: Preparation,
-) -> None:
-    assert replace(whole, has_unsaved_leds=True).missing_inputs() == (
-        MissingInput.SAVED_LEDS,
-    )
-
-
 def test_no_swing_begins_without_both_files(whole: Preparation) -> None:
     for part in (replace(whole, camera_file=None), replace(whole, pen_file=None)):
         with pytest.raises(ValueError, match="must be chosen"):

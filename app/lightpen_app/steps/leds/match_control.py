@@ -1,4 +1,4 @@
-"""The LEDs of the table, compared with the live or simulated images."""
+"""The LEDs of the file, compared with the live or simulated images."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.pen_check.match import PenMatch, add_view, match_pen
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.steps.leds.draft import LedDraft
+from lightpen_app.steps.leds.file_panel import LedFileControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.controls import PushButton
@@ -97,11 +97,11 @@ class PenWatch(QObject):
 
 
 class MatchControl(QObject):
-    """Shows live images in its panel, and how the pen of the table fits them."""
+    """Shows live images in its panel, and how the pen of the open file fits them."""
 
     def __init__(
         self,
-        leds: LedDraft,
+        leds: LedFileControl,
         selection: Selection,
         run: SwingRun,
         live: LiveView,
@@ -114,14 +114,14 @@ class MatchControl(QObject):
         self.watch = PenWatch(self)
 
         # Connections
-        leds.changed.connect(self._on_draft_changed)
+        leds.changed.connect(self._on_file_changed)
         selection.changed.connect(self._region)
         live.image_shown.connect(self._on_image_shown)
         live.connection_changed.connect(self._on_connection_changed)
         live.other_changed.connect(self._on_connection_changed)
 
     def start(self) -> None:
-        """Detect the pen of the table from now on."""
+        """Detect the pen of the open file from now on."""
         self._is_shown = True
         self._panel.clear()
         self.watch.start()
@@ -132,13 +132,13 @@ class MatchControl(QObject):
         """Stop; detect the pen in use again."""
         self._is_shown = False
         self.watch.stop()
-        if self._leds.state.is_pending and not self._run.status.is_capturing:
+        if not self._run.status.is_capturing:
             self._live.set_region(self._selection.preparation.region)
 
     def doubt(self) -> str:
-        """Return why the table may belong to another pen; empty if it fits."""
-        camera, pen = self._selection.preparation.camera, self._leds.state.check.sought
-        match = self.watch.last_match(camera, pen)
+        """Return why the file may belong to another pen; empty if it fits."""
+        camera = self._selection.preparation.camera
+        match = self.watch.last_match(camera, self._sought())
         return self._panel.doubt_of(match)
 
     def retranslate(self) -> None:
@@ -150,32 +150,35 @@ class MatchControl(QObject):
             why = self.tr("Camera connection lost. Reconnecting automatically.")
         elif preparation.camera is None:
             why = self.tr("Intrinsics file missing. See the step Camera.")
-        elif self._leds.state.check.sought is None:
-            why = self.tr("Enter or correct the LEDs first.")
+        elif self._sought() is None:
+            why = self.tr("Open the LED file first.")
         else:
             why = ""
         self._panel.set_why_unknown(why)
 
-    def _on_draft_changed(self) -> None:
-        check = self._leds.state.check
-        self._panel.set_has_frame(check.frame is None or not check.frame.error)
-        self._panel.set_can_correct(check.sought is check.pen)
+    def _sought(self) -> Pen | None:
+        opened = self._leds.opened
+        return None if opened is None else opened.sought
+
+    def _on_file_changed(self) -> None:
+        opened = self._leds.opened
+        self._panel.set_has_frame(opened is None or not opened.problem)
         self._region()
 
     def _region(self) -> None:
-        """Set the region of interest for the pen of the table, saved or not."""
+        """Set the region of interest for the pen of the open file, if it is shown."""
         if not self._is_shown:
             return
-        state, preparation = self._leds.state, self._selection.preparation
-        pen, status = state.check.sought, self._run.status
+        preparation = self._selection.preparation
+        pen, status = self._sought(), self._run.status
         self.watch.set_pen(preparation.camera, pen)
         swung = status.setup if status.is_capturing else None
-        self._panel.set_aside(swung is not None and _differ(swung.pen, pen))
+        self._panel.set_swung(swung is not None and _differ(swung.pen, pen))
         if not status.is_capturing:
-            wanted_region = replace(preparation.region, pen=pen)
-            self._live.set_region(
-                wanted_region if state.is_pending else preparation.region
-            )
+            region = preparation.region
+            if preparation.pen_file is None:
+                region = replace(region, pen=pen)
+            self._live.set_region(region)
         self.retranslate()
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:
@@ -193,7 +196,7 @@ class MatchControl(QObject):
 
 
 def _differ(swung: Pen, pen: Pen | None) -> bool:
-    """Return whether the LEDs of a table differ from the LEDs of the swing."""
+    """Return whether the LEDs of a file differ from the LEDs of the swing."""
     return pen is None or not np.array_equal(swung.leds, pen.leds)
 
 

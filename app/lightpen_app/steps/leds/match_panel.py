@@ -103,8 +103,7 @@ class MatchPanel(Translated, QGroupBox):
         self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
         self._why_none = ""
         self._has_frame = True
-        self._can_correct = True
-        self._is_aside = False
+        self._is_swung = False
 
         # Widgets
         self.view = self.say(
@@ -157,16 +156,10 @@ class MatchPanel(Translated, QGroupBox):
             self._has_frame = has_frame
             self._refresh()
 
-    def set_can_correct(self, can_correct: bool) -> None:
-        """Set whether the table is in the frame of the findings."""
-        if can_correct != self._can_correct:
-            self._can_correct = can_correct
-            self._refresh()
-
-    def set_aside(self, is_aside: bool) -> None:
+    def set_swung(self, is_swung: bool) -> None:
         """Set whether the pen of a swing is being detected instead."""
-        if is_aside != self._is_aside:
-            self._is_aside = is_aside
+        if is_swung != self._is_swung:
+            self._is_swung = is_swung
             self._refresh()
 
     def set_value(self, value: PenMatch | None) -> None:
@@ -228,7 +221,7 @@ class MatchPanel(Translated, QGroupBox):
         detection = self._detection
         if detection is None or self._why_none:
             return State(self.tr("No match yet"), "", Sign.WAIT, Tone.QUIET)
-        if self._is_aside:
+        if self._is_swung:
             word = self.tr("Swing in progress")
             text = self.tr("Rings: expected from the LED file")
             return State(word, text, Sign.WAIT, Tone.QUIET)
@@ -277,7 +270,7 @@ class MatchPanel(Translated, QGroupBox):
 
     def _correctable(self) -> list[Finding | None]:
         """Return the findings that a click can correct, in their places."""
-        if self._match is None or self._why_none or not self._can_correct:
+        if self._match is None or self._why_none:
             return []
         return [
             each if each.can_be_corrected else None

@@ -1,39 +1,55 @@
 """The step LEDs: coordinates, checked against pen frame and live images."""
 
+from PySide6.QtWidgets import QGroupBox
 from typing_extensions import override
 
-from lightpen.pen_check.draft import PenDraft, corrected, exchanged
+from lightpen.model.pen import Pen
+from lightpen.pen_check.frame import corrected, exchanged, leds_to_exchange
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.face import Services, can_discover
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
-from lightpen_app.look.theme import GRID
-from lightpen_app.steps.leds.draft import LedDraft, unsaved_leds_text, why_not_next
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
-from lightpen_app.steps.leds.frame_panel import FramePanel
 from lightpen_app.steps.leds.match_control import LedSimulatorControls, MatchControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.table_panel import LedTablePanel
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import (
     PageScroll,
     ResponsiveLayout,
     ShrinkingScrollContent,
 )
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.pen_view import PenPicture
-from lightpen_app.widgets.tables import UndoButtons
+from lightpen_app.widgets.pen_view import PenPicture, PenView
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.workbench import Workbench
 
 # Of table, pen in space and image
 SHARES = 40, 29, 31
 
 
-class LedsPage(ResponsiveLayout, Page):
-    """Opens, shows, corrects and saves the LED file.
+class FramePanel(Translated, QGroupBox):
+    """Draws a pen, and says whether it is in the pen frame."""
 
-    The table shows a draft. The live match follows it at once; a swing needs a file, so
-    a draft that differs from the file in use must be saved before the next step.
+    def __init__(self) -> None:
+        super().__init__()
+        self.say(self, self.tr("Pen and pen frame"))
+        self.view = PenView()
+        self.frame = SignLabel()
+        self.correct = PushButton()
+        vertical_layout(self, (self.view, 1), self.frame, self.correct)
+
+
+class LedsPage(ResponsiveLayout, Page):
+    """Opens, shows and checks the LED file.
+
+    Corrections are saved as a file that is then in use: a swing needs a file.
     """
 
     key = "leds"
@@ -44,28 +60,27 @@ class LedsPage(ResponsiveLayout, Page):
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
         self._selection = workbench.selection
-        self._leds = LedDraft(self._selection, self)
+        self._correction: Pen | None = None  # that the pen frame needs
+        self._shown_match: PenMatch | None = None
 
         # Widgets
         self._file = LedFilePanel(can_discover=can_discover(services))
-        self._table = LedTablePanel(UndoButtons(self._leds.edits, self))
+        self._leds = LedTablePanel()
         self._space = FramePanel()
         self._simulator = LedSimulatorControls(workbench.live)
         self._match = MatchPanel(self._simulator)
 
         self._pens = workbench.pens
-        self._files = LedFileControl(
-            self._leds, workbench.files, workbench.pens, self._file
-        )
+        self._files = LedFileControl(self._selection, workbench.pens, self._file)
         self._matching = MatchControl(
-            self._leds, self._selection, workbench.run, workbench.live, self._match
+            self._files, self._selection, workbench.run, workbench.live, self._match
         )
 
         # Layout
         self._content = ShrinkingScrollContent()
         self._rows = vertical_layout(self._content, self._file, spacing=2 * GRID)
         self._panels = horizontal_layout(
-            self._rows, (self._table, SHARES[0]), stretch=1, spacing=2 * GRID
+            self._rows, (self._leds, SHARES[0]), stretch=1, spacing=2 * GRID
         )
         self._use_room()  # before the match: the order of the Tab key
         self._panels.addWidget(self._match, SHARES[2])
@@ -75,22 +90,19 @@ class LedsPage(ResponsiveLayout, Page):
 
         # Connections
         self._file.discovery_requested.connect(self.discovery_requested)
-        self._file.exchange_requested.connect(self._on_exchange_requested)
+        self._file.samples_requested.connect(workbench.files.use_samples)
         self._files.status_changed.connect(workbench.notifications.show_status)
-        self._table.value_changed.connect(self._leds.edit)
-        self._table.discard_requested.connect(self._files.discard)
-        self._table.led_chosen.connect(self._space.view.set_chosen)
-        self._space.led_chosen.connect(self._table.set_chosen)
-        self._space.move_requested.connect(self._on_move_requested)
+        self._files.changed.connect(self._on_file_changed)
+        self._leds.table.led_chosen.connect(self._space.view.set_chosen)
+        self._space.view.led_chosen.connect(self._leds.table.set_chosen)
+        self._space.correct.clicked.connect(self._on_correct_clicked)
         self._match.correction_requested.connect(self._on_correction_requested)
         self._matching.watch.value_changed.connect(self._on_match_changed)
-        self._leds.changed.connect(self._on_draft_changed)
         self._pens.changed.connect(self.changed)
         self._selection.changed.connect(self._on_selection_changed)
-        self._selection.station_changed.connect(self._files.drop_job)
 
-        self._files.retranslate()
         self._on_selection_changed()
+        self._on_file_changed()
 
     @override
     def lead(self) -> str:
@@ -118,8 +130,8 @@ class LedsPage(ResponsiveLayout, Page):
 
     @override
     def main_action(self) -> MainAction:
-        why_not = why_not_next(self._leds.state, self._selection.preparation)
-        return MainAction(self.tr("Continue to the swing"), why_not)
+        missing = self._selection.preparation.leds_missing_inputs()
+        return MainAction(self.tr("Continue to the swing"), first_missing(missing))
 
     @override
     def run_main_action(self) -> None:
@@ -131,15 +143,12 @@ class LedsPage(ResponsiveLayout, Page):
     @override
     def entered(self) -> None:
         self._matching.start()
+        self._files.reread()
 
     @override
     def left(self) -> None:
         self._matching.stop()
         self._simulator.rest()
-
-    @override
-    def unsaved(self) -> str:
-        return unsaved_leds_text(self._leds.state)
 
     @override
     def shut_down(self) -> None:
@@ -149,9 +158,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _retranslate(self) -> None:
         self._files.retranslate()
         self._matching.retranslate()
-        self._table.set_flaw(self._leds.state.check.flaw)
-        self._table.set_marked(self._match.reasons())
-        self._refresh()
+        self._on_file_changed()
 
     @override
     def _use_room(self) -> None:
@@ -164,43 +171,63 @@ class LedsPage(ResponsiveLayout, Page):
             self._panels.insertWidget(1, self._space, SHARES[1])
 
     def _on_selection_changed(self) -> None:
-        self._leds.follow_selection()
         source = self._selection.preparation.source
         self._file.set_has_samples(source.kind == SourceKind.SIMULATED)
         self._refresh()
 
-    def _on_draft_changed(self) -> None:
-        state = self._leds.state
-        self._table.set_value(state.draft, state.changes)
-        self._table.set_flaw(state.check.flaw)
+    def _on_file_changed(self) -> None:
+        """Show the LEDs of the open file, and the correction that its frame needs."""
+        opened, note, verb = self._files.opened, StatusMessage(), ""
+        self._correction = remark = None
+        if opened is not None and opened.pen is not None:
+            frame, pair = opened.frame, leds_to_exchange(opened.frame)
+            remark = frame.remark
+            if pair is not None:
+                self._correction = exchanged(opened.pen, pair)
+                verb = self.tr("Swap {0} and {1}").format(*pair)
+            elif frame.can_be_moved:
+                self._correction = opened.sought
+                verb = self.tr("Transform to pen frame")
+            if remark is not None:
+                words = self.tr(
+                    "Other layout than the ten-LED pen; the frame of the file is used "
+                    "as is."
+                )
+                note = StatusMessage(words, Sign.WARNING, Tone.QUIET)
+            elif frame.error is None:
+                note = StatusMessage.good(self.tr("The LEDs are in the pen frame."))
+        self._space.frame.set_value(note)
+        set_tooltip(self._space.frame, "" if remark is None else worded(remark))
+        self._space.correct.setText(verb)
+        self._space.correct.setVisible(bool(verb))
         self._refresh()
         self.changed.emit()
 
     def _refresh(self) -> None:
-        """Show the state of the draft and the nominal tip in use."""
-        pen, tip = self._leds.state.check.pen, self._selection.preparation.nominal_tip
-        overriding = ""  # nominal tip in use, if not the table's
-        if tip is not None and pen is not None:
-            overriding = "  ".join(f"{each:g}" for each in tip.tolist())
-        elif pen is not None:
+        """Show the pen of the open file and the nominal tip in use."""
+        opened, tip = self._files.opened, self._selection.preparation.nominal_tip
+        pen = None if opened is None else opened.pen
+        self._leds.set_value(pen, tip)
+        self._show_match()
+        if tip is None and pen is not None:
             tip = pen.nominal_tip
-        self._space.set_value(self._leds.state.check.frame)
         marked = frozenset(self._match.reasons())
-        self._space.set_picture(PenPicture(pen, tip, marked))
-        self._table.set_overriding_tip(overriding)
+        self._space.view.set_value(PenPicture(pen, tip, marked))
 
-    def _on_move_requested(self) -> None:
-        sought = self._leds.state.check.sought
-        if sought is not None:
-            self._leds.edit(PenDraft.of(sought))
+    def _show_match(self) -> None:
+        match = self._shown_match
+        rms = () if match is None else enumerate(match.rms.tolist(), 1)
+        misfits = {led: each for led, each in rms if each == each}  # px, of LEDs seen
+        self._leds.table.set_match(misfits, self._match.reasons())
 
-    def _on_exchange_requested(self, pair: tuple[int, int]) -> None:
-        self._table.focus_cells()
-        self._leds.edit(exchanged(self._leds.state.draft, pair))
+    def _on_correct_clicked(self) -> None:
+        if self._correction is not None:
+            self._files.ask_place(self._correction)
 
     def _on_correction_requested(self, finding: Finding) -> None:
-        self._table.focus_cells()
-        self._leds.edit(corrected(self._leds.state.draft, finding))
+        opened = self._files.opened
+        if opened is not None and opened.sought is not None:
+            self._files.ask_place(corrected(opened.sought, finding))
 
     def _doubt_question(self) -> tuple[str, str]:
         """Return the question whether to swing with LEDs that do not fit.
@@ -213,11 +240,8 @@ class LedsPage(ResponsiveLayout, Page):
         return " ".join(filter(None, parts)), self.tr("Swing anyway")
 
     def _on_match_changed(self, match: PenMatch | None) -> None:
+        self._shown_match = match
         self._match.set_value(match)
-        rms = () if match is None else enumerate(match.rms.tolist(), 1)
-        misfits = {led: each for led, each in rms if each == each}  # px, of LEDs seen
-        self._table.set_misfits(misfits)
-        self._file.refresh_question()  # the pen may only have entered the image
-        self.changed.emit()
-        self._table.set_marked(self._match.reasons())
+        self._file.question.refresh()  # the pen may only have entered the image
         self._refresh()
+        self.changed.emit()

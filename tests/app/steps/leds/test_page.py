@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,21 +18,20 @@ from tests.faulty_camera import FaultyCamera
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.formats.opened_files import PenFile
-from lightpen.formats.pen_files import read_pen, write_pen
-from lightpen.model.pen import Pen
+from lightpen.formats.pen_files import write_pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import LedFile, ListedPen, read_library
 from lightpen.record.swings.header import Names
-from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
-from lightpen_app.steps.leds.file_panel import LedFilePanel
+from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
 from lightpen_app.steps.leds.match_control import LedSimulatorControls
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
-from lightpen_app.steps.leds.table_panel import MISFIT, LedTable, LedTablePanel
+from lightpen_app.steps.leds.table_panel import MISFIT, LedTable
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.state_banner import StateBanner
@@ -44,7 +42,6 @@ from lightpen_extensions.simulator.scenes import Scene, fanned_pen, six_led_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 if TYPE_CHECKING:
-    from tests.app.conftest import HoldBack
     from tests.app.steps.conftest import See, Seen
 
 LEDS = paper_pen().leds
@@ -69,41 +66,14 @@ def open_file(seen: "Seen", path: Path) -> None:
     seen.enter("LED file", str(path))
 
 
-def type_cell(seen: "Seen", led: int, column: int, text: str) -> None:
-    """Type into a cell of the table and press Enter."""
-    table = led_table(seen)
-    table.setCurrentIndex(table.model().index(led - 1, column))
-    QTest.keyClick(table, Qt.Key.Key_F2)
-    editor = QApplication.focusWidget()
-    assert isinstance(editor, QLineEdit)
-    editor.selectAll()
-    QTest.keyClicks(editor, text)
-    QTest.keyClick(editor, Qt.Key.Key_Return)
-    QApplication.processEvents()
-
-
 def cell(seen: "Seen", led: int, column: int) -> str:
     return str(led_table(seen).model().index(led - 1, column).data())
-
-
-def cell_of_file(led: int, column: int) -> str:
-    return f"{LEDS[led - 1, column - 1]:g}"
 
 
 def reported(seen: "Seen", led: int) -> str:
     """Return what the table says of an LED."""
     index = led_table(seen).model().index(led - 1, 0)
     return str(index.data(Qt.ItemDataRole.ToolTipRole) or "")
-
-
-def save_as(seen: "Seen", path: Path) -> None:
-    seen.click("Save as...")
-    dialog = seen.child(QFileDialog)
-    dialog.selectFile(str(path))
-    dialog.accept()
-    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    seen.settle()  # whether there is such a file
-    seen.settle()  # and what becomes of it
 
 
 @pytest.fixture
@@ -166,17 +136,11 @@ def raw() -> FloatArray:
 def test_the_file_in_use_is_shown(seen: "Seen", workbench: Workbench) -> None:
     assert shown_path(seen) == str(in_use(workbench).path)
     assert [cell(seen, 8, column) for column in (X, Y, Z)] == ["25", "35", "0"]
-    for words in ("LED numbering", "LED 1 at x = y = 0", "Right-handed axes"):
-        assert words in seen.words
+    assert "The LEDs are in the pen frame." in seen.words
+    assert "Disc \u00d8 10 mm" in seen.words
+    assert "Nominal tip: 0  -90  -25 mm" in seen.words
     assert seen.page.is_complete()
     assert why_not(seen) == ""
-
-
-def test_the_rules_say_in_words_how_they_fare(seen: "Seen") -> None:
-    label = seen.named("LEDs 1-4 on a line")
-
-    assert label.accessibleDescription() == "fulfilled"
-    assert "0.00 mm" in seen.words
 
 
 def test_without_a_file_one_has_to_be_opened(
@@ -189,8 +153,6 @@ def test_without_a_file_one_has_to_be_opened(
     assert why_not(seen) == "Open the LED geometry file."
     assert not seen.page.is_complete()
     assert led_table(seen).model().rowCount() == 0
-    save = seen.named("Save as...")
-    assert (save.isEnabled(), save.toolTip()) == (False, "The table has no LEDs.")
 
 
 def test_the_simulated_pens_file_is_used_at_a_click(
@@ -319,50 +281,67 @@ def test_a_pen_of_another_layout_keeps_its_frame(seen: "Seen", tmp_path: Path) -
     open_file(seen, path)
 
     assert "Other layout than the ten-LED pen;" in seen.words
-    assert "LEDs 1-4 on a line" not in seen.words
     assert seen.page.is_complete()
 
 
 # The pen frame
 
 
-def test_exchanged_leds_of_a_file_are_named_and_can_be_corrected(
+def save_as(seen: "Seen", path: Path) -> None:
+    dialog = seen.child(QFileDialog)
+    dialog.selectFile(str(path))
+    dialog.accept()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    seen.settle()
+
+
+def test_exchanged_leds_of_a_file_are_named_and_a_corrected_file_is_used(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
-    before = in_use(workbench)
     path = write_table(tmp_path / "swapped.csv", exchanged())
 
     open_file(seen, path)
     assert "swapped.csv: LEDs 5 and 8 are swapped" in seen.words
-    numbers = seen.named("LED numbering")
-    assert numbers.accessibleDescription() == "not fulfilled"
-    assert in_use(workbench) is before
-    assert seen.page.unsaved() == ""  # nobody has changed anything
-    assert why_not(seen) == "Correct the LED table first (see the message above)."
-    assert not seen.named("Save as...").isEnabled()
+    assert cell(seen, 8, Y) == f"{exchanged()[7, 1]:g}"
+    assert why_not(seen) == "Open the LED geometry file."  # none is in use
 
     seen.click("Swap 5 and 8")
+    assert seen.child(QFileDialog).selectedFiles() == [
+        str(tmp_path / "swapped corrected.json")
+    ]
+    save_as(seen, tmp_path / "good.json")
 
-    assert "exchanged" not in seen.words
+    assert "are swapped" not in seen.words
     assert not seen.shows("Swap 5 and 8")
-    assert why_not(seen) == "Save the LED table first; the record needs its file."
-    save_as(seen, tmp_path / "corrected.csv")
-    assert in_use(workbench).path == tmp_path / "corrected.csv"
+    assert in_use(workbench).path == tmp_path / "good.json"
+    assert shown_path(seen) == str(tmp_path / "good.json")
+    np.testing.assert_array_equal(in_use(workbench).pen.leds, LEDS)
     assert why_not(seen) == ""
 
 
-def test_a_file_that_cannot_be_used_is_left_again(
+def test_another_file_takes_the_place_of_one_that_cannot_be_used(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     open_file(seen, write_table(tmp_path / "swapped.csv", exchanged()))
+    open_file(seen, write_table(tmp_path / "leds.csv", LEDS))
 
-    discard = seen.named("Discard")
-    assert discard.toolTip() == "Restore the file in use"
-    seen.click("Discard")
-
-    assert shown_path(seen) == str(in_use(workbench).path)
-    assert "exchanged" not in seen.words
+    assert in_use(workbench).path == tmp_path / "leds.csv"
+    assert "are swapped" not in seen.words
     assert seen.page.is_complete()
+
+
+def test_a_corrected_file_that_cannot_be_written_is_reported(
+    seen: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    before = in_use(workbench)
+    control = seen.page.findChild(LedFileControl)
+    assert control is not None
+
+    control.save(paper_pen(), tmp_path / "no folder" / "leds.json")
+    seen.settle()
+
+    assert "leds.json" in seen.words
+    assert in_use(workbench) is before
 
 
 def test_raw_coordinates_are_put_into_the_pen_frame(
@@ -370,14 +349,12 @@ def test_raw_coordinates_are_put_into_the_pen_frame(
 ) -> None:
     open_file(seen, write_table(tmp_path / "raw.csv", raw()))
     assert "The LEDs are not in the pen frame" in seen.words
-    origin = seen.named("LED 1 at x = y = 0")
-    assert origin.accessibleDescription() == "not fulfilled"
 
     seen.click("Transform to pen frame")
+    save_as(seen, tmp_path / "leds.json")
 
     assert "not in the pen frame" not in seen.words
     assert cell(seen, 8, Y) == "35"
-    save_as(seen, tmp_path / "leds.csv")
     np.testing.assert_allclose(in_use(workbench).pen.leds, LEDS, atol=1e-5)
 
 
@@ -386,251 +363,27 @@ def test_a_pen_in_its_frame_need_not_be_moved(seen: "Seen") -> None:
         seen.named("Transform to pen frame")
 
 
-# The table
+# A file that is edited by another program
 
 
-def test_leds_that_cannot_be_a_pen_are_reported_and_still_drawn(seen: "Seen") -> None:
-    type_cell(seen, 7, Y, "16")
-
-    assert "LEDs 5 and 7 are 4.00 mm apart, too close" in seen.words
-    assert seen.child(PenView).value().pen is not None
-
-
-def test_a_changed_cell_is_in_use_once_it_is_saved(
+def test_a_file_that_has_changed_is_read_again(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
-    before = in_use(workbench)
-    type_cell(seen, 7, Y, "160,25")
-
-    assert in_use(workbench) is before
-    assert why_not(seen) == "Save the LED table first; the record needs its file."
-    assert seen.page.unsaved() == "The LED table has unsaved changes."
-    assert workbench.selection.preparation.leds_missing_inputs() == (
-        MissingInput.SAVED_LEDS,
-    )
-
-    statuses: list[str] = []
-    workbench.notifications.status_changed.connect(statuses.append)
-    save_as(seen, tmp_path / "other")  # the dialog adds the ending
-
-    path = tmp_path / "other.json"
-    assert read_pen(path).leds[6, 1] == 160.25
-    assert (in_use(workbench).path, shown_path(seen)) == (path, str(path))
-    assert statuses == ["LEDs saved as other.json and in use."]
-    assert (why_not(seen), seen.page.unsaved()) == ("", "")
-    assert workbench.selection.preparation.leds_missing_inputs() == ()
-
-
-def test_typing_the_old_number_again_leaves_nothing_to_save(seen: "Seen") -> None:
-    type_cell(seen, 7, Y, "161")
-    type_cell(seen, 7, Y, "160")
-
-    assert (why_not(seen), seen.page.unsaved()) == ("", "")
-
-
-def test_a_file_that_exists_is_replaced_only_if_the_user_agrees(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    path = tmp_path / "other.json"
-    path.write_text("precious")
-    type_cell(seen, 7, Y, "161")
-
-    save_as(seen, path)
-    assert "other.json already exists. Replace it with these LEDs?" in seen.words
-    seen.click("Cancel")
-    assert path.read_text() == "precious"
-    assert seen.page.unsaved()
-
-    save_as(seen, path)
-    seen.click("Replace")
-    seen.settle()
-    assert read_pen(path).leds[6, 1] == 161
-    assert in_use(workbench).path == path
-
-
-def test_a_table_has_no_place_for_the_tip(seen: "Seen", tmp_path: Path) -> None:
-    type_cell(seen, 7, Y, "161")
-
-    save_as(seen, tmp_path / "leds.csv")
-
-    assert "Choose a name that ends in .json." in seen.words
-    assert seen.page.unsaved()
-    assert not (tmp_path / "leds.csv").exists()
-
-
-def test_a_file_that_cannot_be_written_is_reported(
-    seen: "Seen", tmp_path: Path
-) -> None:
-    type_cell(seen, 7, Y, "161")
-
-    seen.child(LedFilePanel).save_chosen.emit(tmp_path / "no folder" / "leds.json")
-    seen.settle()
-
-    assert "leds.json" in seen.words
-    assert seen.page.unsaved()
-
-
-def test_discarding_changes_asks_first(seen: "Seen") -> None:
-    discard = seen.named("Discard")
-    assert (discard.isEnabled(), discard.toolTip()) == (False, "No changes")
-    type_cell(seen, 7, Y, "161")
-
-    seen.click("Discard")
-    assert seen.child(QuestionBar).words()
-    seen.click("Cancel")
-    assert cell(seen, 7, Y) == "161"
-
-    seen.click("Discard")
-    seen.click("Discard changes")
-    assert cell(seen, 7, Y) == "160"
-    assert seen.page.unsaved() == ""
-
-
-def test_opening_another_file_asks_before_changes_are_lost(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    before = in_use(workbench)
     path = write_table(tmp_path / "leds.csv", LEDS)
-    type_cell(seen, 7, Y, "161")
-
     open_file(seen, path)
-    seen.click("Cancel")
-    assert (in_use(workbench), shown_path(seen)) == (before, str(before.path))
-    assert cell(seen, 7, Y) == "161"
 
-    open_file(seen, path)
-    seen.click("Discard changes")
-    seen.settle()
-    assert in_use(workbench).path == path
-    assert cell(seen, 7, Y) == "160"
+    moved = LEDS.copy()
+    moved[6, 1] += 0.25
+    write_table(path, moved)
+    seen.until(lambda: cell(seen, 7, Y) == "160.25")
+    moved[6, 1] += 0.25
+    write_table(tmp_path / "new.csv", moved).replace(path)
+    seen.until(lambda: cell(seen, 7, Y) == "160.5")
+
+    assert in_use(workbench).pen.leds[6, 1] == 160.5
 
 
 @pytest.fixture
-def slow_disk(hold_back: "HoldBack") -> Event:
-    """LED files are read and written once this is set."""
-    return hold_back(
-        "lightpen_app.steps.leds.file_panel.open_pen",
-        "lightpen_app.steps.leds.file_panel.save_pen",
-    )
-
-
-def test_what_is_typed_while_a_file_is_read_is_lost_after_a_question_only(
-    seen: "Seen", workbench: Workbench, tmp_path: Path, slow_disk: Event
-) -> None:
-    path = write_table(tmp_path / "leds.csv", LEDS)
-    seen.child(LedFilePanel).path_chosen.emit(str(path))
-    type_cell(seen, 7, Y, "161")
-    slow_disk.set()
-    seen.settle()
-    assert cell(seen, 7, Y) == "161"
-    assert (
-        seen.child(QuestionBar).words().startswith("The LED table has unsaved changes.")
-    )
-
-    seen.click("Discard changes")
-    assert in_use(workbench).path == path
-    assert cell(seen, 7, Y) == "160"
-
-
-def test_what_is_typed_while_the_table_is_saved_is_still_to_be_saved(
-    seen: "Seen", workbench: Workbench, tmp_path: Path, slow_disk: Event
-) -> None:
-    path = tmp_path / "leds.json"
-    type_cell(seen, 7, Y, "161")
-    seen.child(LedFilePanel).save_chosen.emit(path)
-    type_cell(seen, 7, Y, "162")
-    slow_disk.set()
-    seen.settle()
-
-    assert in_use(workbench).path == path
-    assert read_pen(path).leds[6, 1] == 161
-    assert cell(seen, 7, Y) == "162"
-    assert shown_path(seen).endswith("leds.json")
-    assert seen.page.unsaved()
-    assert why_not(seen) == "Save the LED table first; the record needs its file."
-    seen.click("Discard")
-    seen.click("Discard changes")
-    assert cell(seen, 7, Y) == "161"
-
-
-def test_changes_outlive_another_file_that_another_step_puts_in_use(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    write_pen(six_led_pen(), path := tmp_path / "six.json")
-    type_cell(seen, 7, Y, "161")
-
-    workbench.selection.set_preparation(
-        replace(workbench.selection.preparation, pen_file=PenFile.read(path))
-    )
-    assert cell(seen, 7, Y) == "161"
-    assert shown_path(seen) == str(path)
-    assert seen.page.unsaved()
-    assert why_not(seen) == "Save the LED table first; the record needs its file."
-
-    seen.click("Discard")
-    seen.click("Discard changes")
-    assert led_table(seen).model().rowCount() == 6
-    assert (why_not(seen), seen.page.unsaved()) == ("", "")
-
-
-def test_leds_are_added_and_removed(seen: "Seen") -> None:
-    remove = seen.named("Remove")
-    assert not remove.isEnabled()
-    assert remove.toolTip() == "Select an LED in the table."
-
-    seen.click("Add")
-    assert "LED 11, x: a cell is empty where a number is needed." in seen.words
-    assert led_table(seen).chosen() == 11
-
-    seen.click("Remove")
-    assert led_table(seen).model().rowCount() == 10
-    assert seen.page.unsaved() == ""
-
-
-def test_a_pen_keeps_four_leds(seen: "Seen") -> None:
-    led_table(seen).set_chosen(1)
-    for _ in range(6):
-        seen.click("Remove")
-
-    remove = seen.named("Remove")
-    assert led_table(seen).model().rowCount() == 4
-    assert (remove.isEnabled(), remove.toolTip()) == (
-        *(False, "A pen needs at least 4 LEDs."),
-    )
-
-
-def test_diameter_and_tip_are_edited_with_the_table(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    seen.enter("Diameter of the LED discs, mm", "8")
-    seen.enter("Nominal tip centre, y, mm", "-95,5")
-    seen.enter("Nominal tip centre, z, mm", "-2.5 cm")
-    type_cell(seen, 1, X, "20 um")
-    save_as(seen, tmp_path / "leds.json")
-
-    pen = in_use(workbench).pen
-    assert pen.diameter == 8
-    assert pen.nominal_tip is not None
-    assert pen.nominal_tip.tolist() == [0.0, -95.5, -25.0]
-    assert cell(seen, 1, X) == "0.02"
-
-
-def test_a_diameter_or_tip_that_cannot_be_is_reported(seen: "Seen") -> None:
-    seen.enter("Diameter of the LED discs, mm", "x")
-    assert 'Diameter of the discs: "x" is not a number.' in seen.words
-    assert (
-        seen.named("Diameter of the LED discs, mm").property("tone") == Tone.BAD.value
-    )
-
-    seen.enter("Diameter of the LED discs, mm", "10")
-    seen.enter("Nominal tip centre, y, mm", "-9O")
-    assert 'Nominal tip, y: "-9O" is not a number (letter O).' in seen.words
-    assert (
-        seen.named("Diameter of the LED discs, mm").property("tone") == Tone.PLAIN.value
-    )
-    assert seen.named("Nominal tip centre, y, mm").property("tone") == Tone.BAD.value
-
-
 def test_the_nominal_tip_of_the_first_step_is_reported_where_it_rules(
     seen: "Seen", workbench: Workbench
 ) -> None:
@@ -691,10 +444,14 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
 
 
 @pytest.mark.slow
-def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
+def test_a_displaced_led_is_named_and_marked_everywhere(
+    live: "Seen", tmp_path: Path
+) -> None:
     live.wait("10 of 10 LEDs")
+    moved = LEDS.copy()
+    moved[6, 1] += 0.5
 
-    type_cell(live, 7, Y, "160.5")
+    open_file(live, write_table(tmp_path / "moved.csv", moved))
 
     live.wait(
         "LED 7 is 0.50 mm from its file position. Measured: x 0.00, y -0.50, z 0.00 mm."
@@ -705,7 +462,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     assert live.child(StateBanner).value().tone is Tone.WARN
 
     live.click("Use measured position")
-    assert led_table(live).hasFocus()
+    save_as(live, tmp_path / "corrected.json")
 
     live.wait("All LEDs are within 0.1 mm of their table positions, in")
     assert float(cell(live, 7, Y)) == pytest.approx(160, abs=0.05)
@@ -714,95 +471,20 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
 
 
 @pytest.mark.slow
-def test_an_exchanged_coordinate_is_put_back_by_a_click(live: "Seen") -> None:
-    live.wait("10 of 10 LEDs")
-    second, fourth = (cell(live, led, Y) for led in (2, 4))
-    sixth = cell(live, 6, Y)
-    type_cell(live, 2, Y, sixth)
-    type_cell(live, 6, Y, second)
-    live.wait("of LEDs 2 and 6 are swapped in the table.")
-
-    live.click("Swap 2 and 6")
-
-    live.wait("All LEDs are within 0.1 mm of their table positions, in")
-    assert [cell(live, led, Y) for led in (2, 4, 6)] == [second, fourth, sixth]
-    assert not live.page.unsaved()
-
-
-def test_changes_of_the_table_are_undone_and_redone_by_keys(seen: "Seen") -> None:
-    assert not seen.named("Undo").isEnabled()
-    type_cell(seen, 7, Y, "161")
-    type_cell(seen, 8, Y, "162")
-    control = Qt.KeyboardModifier.ControlModifier
-
-    QTest.keyClick(led_table(seen), Qt.Key.Key_Z, control)
-    assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", cell_of_file(8, Y))
-    seen.click("Undo")
-    assert cell(seen, 7, Y) == cell_of_file(7, Y)
-    assert not seen.named("Undo").isEnabled()
-    assert not seen.page.unsaved()
-
-    shift = Qt.KeyboardModifier.ShiftModifier
-    QTest.keyClick(led_table(seen), Qt.Key.Key_Z, control | shift)
-    seen.click("Redo")
-    assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", "162")
-
-
-def test_the_focus_goes_from_undo_to_redo_and_back_when_nothing_is_left_to_do(
-    seen: "Seen",
-) -> None:
-    type_cell(seen, 7, Y, "161")
-    undo, redo = seen.named("Undo"), seen.named("Redo")
-    undo.setFocus()
-
-    QTest.keyClick(undo, Qt.Key.Key_Space)
-    assert undo.window().focusWidget() is redo
-    QTest.keyClick(redo, Qt.Key.Key_Space)
-    assert undo.window().focusWidget() is undo
-
-
-def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None:
-    tip = seen.named("Nominal tip centre, x, mm")
-    QTest.keyClicks(tip, "12.5")
-    seen.click("Undo")
-    assert not seen.page.unsaved()
-
-
-def test_discarded_changes_come_back(seen: "Seen") -> None:
-    type_cell(seen, 7, Y, "161")
-    seen.click("Discard")
-    seen.click("Discard changes")
-
-    seen.click("Undo")
-
-    assert cell(seen, 7, Y) == "161"
-
-
-def test_another_file_has_nothing_to_undo(seen: "Seen", tmp_path: Path) -> None:
-    seen.click("Add")
-    seen.click("Undo")
-    other = LEDS + np.array([0.0, 0.5, 0.0])
-    open_file(seen, write_table(tmp_path / "other.csv", other))
-
-    assert not seen.named("Undo").isEnabled()
-    assert not seen.named("Redo").isEnabled()
-
-
 @pytest.mark.slow
-def test_the_match_follows_the_table_and_another_page_sees_the_pen_in_use(
-    live: "Seen", workbench: Workbench, qtbot: QtBot
+def test_the_match_follows_the_file_and_another_page_sees_the_pen_in_use(
+    live: "Seen", workbench: Workbench, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    led_table(live).set_chosen(10)
-    live.click("Remove")
+    open_file(live, write_table(tmp_path / "nine.csv", LEDS[:9]))
     live.wait("9 of 9 LEDs")
     live.wait("moves with the pen. Is an LED missing in the table?")
-    assert in_use(workbench).pen.n_leds == 10
+    assert in_use(workbench).pen.n_leds == 9
 
     live.page.left()
 
     def sees_all(shown: DisplayedImage) -> bool:
         detection = shown.seen.detection
-        return detection is not None and len(detection.pixels) == 10
+        return detection is not None and len(detection.pixels) == 9
 
     with qtbot.waitSignal(workbench.live.image_shown, check_params_cb=sees_all):
         pass
@@ -1018,49 +700,17 @@ def test_nothing_is_compared_while_another_page_is_shown(
     assert seen.markers == ()
 
 
-# The page in its window
-
-
-def test_a_pen_keeps_every_digit_while_nothing_is_changed(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    pen: Pen = replace(paper_pen(), leds=LEDS + 1e-9)
-    write_pen(pen, path := tmp_path / "exact.json")
-    open_file(seen, path)
-
-    save_as(seen, tmp_path / "copy.json")
-
-    np.testing.assert_array_equal(in_use(workbench).pen.leds, pen.leds)
-
-
 # What comes late, or in another language
 
 
-def test_a_question_about_changes_goes_with_the_changes(seen: "Seen") -> None:
-    type_cell(seen, 8, X, "26")
-    seen.click("Discard")
-    assert seen.child(QuestionBar).words() != ""
-    seen.click("Undo")
-
-    assert seen.child(QuestionBar).words() == ""
-
-
-def test_what_is_wrong_and_what_is_asked_is_reported_in_the_language_that_is_chosen(
+def test_what_is_wrong_is_reported_in_the_language_that_is_chosen(
     seen: "Seen", tmp_path: Path, qapp: QApplication
 ) -> None:
-    path = write_table(tmp_path / "exchanged.csv", exchanged())
-    open_file(seen, path)
-    type_cell(seen, 8, X, "wide")
-    seen.click("Discard")
-    panel, table = seen.child(LedFilePanel), seen.child(LedTablePanel)
-    english = panel.problem(), table.flaw(), panel.question()
-    assert english[1] != ""
-    assert english[2] != ""
+    open_file(seen, write_table(tmp_path / "exchanged.csv", exchanged()))
+    panel = seen.child(LedFilePanel)
+    english = panel.problem()
 
     LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
-    now = panel.problem(), table.flaw(), panel.question()
-    assert all(
-        one != other or not other for one, other in zip(english, now, strict=True)
-    )
+    assert panel.problem() not in ("", english)
