@@ -148,10 +148,9 @@ class NumberField(LeavesPageKeys, QLineEdit):
         self._change(self._typed)
 
     def _change(self, value: float) -> None:
-        is_other, self._value = value != self._value, value
+        self._value = value
         self._show()
-        if is_other:
-            self.value_changed.emit(value)
+        self.value_changed.emit(value)
 
     def _read(self) -> tuple[float, str]:
         """Return the typed number, and why it is refused, empty if it is not."""
@@ -203,7 +202,9 @@ class NumberField(LeavesPageKeys, QLineEdit):
         step = max(10.0 ** (digits - 1), finest)
         least, largest = self._limits
         stepped = round(self._value + n_steps * step, self._n_decimals)
-        self._change(max(least, min(stepped, largest)))
+        within = max(least, min(stepped, largest))
+        if within != self._value:
+            self._change(within)
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
@@ -27,6 +28,7 @@ from lightpen_app.widgets.fields import Translated, add_labelled
 from lightpen_app.widgets.number_field import NumberField
 
 LARGEST_BALL = 100.0  # mm
+EDITED = tuple(map(attrgetter, ("operator", "pen", "tip", "cone")))
 
 
 class NamesForm(Translated, QWidget):
@@ -37,6 +39,7 @@ class NamesForm(Translated, QWidget):
     # The name of the station is finished, or chosen from the list.
     station_changed = Signal(str)
     station_entered = Signal()  # it was finished by the Enter key
+    ball_entered = Signal(float)  # mm; 0 is not specified
     nominal_tip_changed = Signal()
     # ItemKind, str: a pen, tip or cone was chosen from its list
     item_chosen = Signal(object, str)
@@ -106,7 +109,7 @@ class NamesForm(Translated, QWidget):
             button.chosen.connect(partial(self.item_chosen.emit, kind))
             listed[kind].list_requested.connect(button.showMenu)
             button.library_requested.connect(partial(self.library_requested.emit, kind))
-        self._ball.value_changed.connect(self.value_changed)
+        self._ball.value_changed.connect(self.ball_entered)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
 
     def value(self) -> Names:
@@ -120,14 +123,16 @@ class NamesForm(Translated, QWidget):
             ball_diameter=self._ball.value() or None,
         )
 
-    def set_value(self, names: Names) -> None:
-        """Show other names; unchanged fields are not touched."""
+    def set_value(self, names: Names, before: Names | None = None) -> None:
+        """Show other names; fields of unchanged ones may be in use."""
         blocked = self.blockSignals(True)
-        if names.station != self._station.value():
+        is_other = before is None or names.station != before.station
+        if is_other and names.station != self._station.value():
             self._station.set_value(names.station)
-        texts = (names.operator, names.pen, names.tip, names.cone)
-        for edit, text in zip(self._edits, texts, strict=True):
-            if text != edit.text().strip():
+        for edit, read in zip(self._edits, EDITED, strict=True):
+            text = read(names)
+            is_other = before is None or text != read(before)
+            if is_other and text != edit.text().strip():
                 edit.setText(text)
                 edit.setCursorPosition(0)
         self._ball.set_value(names.ball_diameter or 0.0)

@@ -10,6 +10,7 @@ from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent, QWindow
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen.arrays import FloatArray
 from lightpen.model.names import Origin
 from lightpen.record.library.library_changes import (
     Author,
@@ -317,10 +318,14 @@ class EntryPresenter(QObject):
         self._selection, self._library = selection, library
         self._names, self._limits, self._assumed = names, limits, assumed
         self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
+        # Typed here, perhaps before the name of the tip: for a tip that is not known
+        self._ball: float | None = None
+        self._nominal_tip: FloatArray | None = None
 
         # Connections
         names.value_edited.connect(self._on_edited)
         names.value_changed.connect(self._take_names)
+        names.ball_entered.connect(self._on_ball_entered)
         names.station_changed.connect(self._on_station_changed)
         names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
         library.chosen.connect(self._on_item_chosen)
@@ -362,12 +367,24 @@ class EntryPresenter(QObject):
         names = replace(self._names.value(), station=now.names.station)
         if names == now.names:
             return
-        is_other = names.tip != now.names.tip
         renamed, listed = now.renamed(names), self._library.tip(names.tip)
-        is_bare = renamed.names.ball_diameter is None
-        if is_other and listed is not None and is_bare:
-            renamed = renamed.with_listed(listed)
+        if names.tip != now.names.tip:
+            ball = renamed.names.ball_diameter or self._ball
+            point = self._nominal_tip
+            point = point if renamed.nominal_tip is None else renamed.nominal_tip
+            names = replace(renamed.names, ball_diameter=ball)
+            renamed = replace(renamed, names=names, nominal_tip=point)
+            if listed is not None:
+                renamed = renamed.with_listed(listed)
         self._selection.set_preparation(renamed)
+
+    def _on_ball_entered(self, ball: float) -> None:
+        self._ball = ball or None
+        self._take_names()
+
+    def forget_typed(self) -> None:
+        """Keep what was typed for the tip that is chosen from another tip."""
+        self._ball = self._nominal_tip = None
 
     def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
         """Apply a selected pen, tip or cone; a tip with its properties."""
@@ -375,6 +392,7 @@ class EntryPresenter(QObject):
         now = self._selection.preparation
         tip = self._library.tip(name)
         if kind is ItemKind.TIP and tip is not None:
+            self.forget_typed()
             self._selection.set_preparation(now.with_listed(tip))
         elif kind is ItemKind.PEN:
             names = replace(now.names, pen=name)
@@ -404,6 +422,7 @@ class EntryPresenter(QObject):
 
     def _on_nominal_tip_changed(self) -> None:
         now, point = self._selection.preparation, self._names.nominal_tip()
+        self._nominal_tip = point
         self._selection.set_preparation(replace(now, nominal_tip=point))
 
     def _on_limits_changed(self) -> None:
@@ -424,16 +443,15 @@ class EntryPresenter(QObject):
             self._on_station_changed(station)
 
     def _on_selected(self, before: Preparation) -> None:
-        self._show(self._selection.preparation, before)
+        now = self._selection.preparation
+        if now.names.tip not in (before.names.tip, self._names.value().tip):
+            self.forget_typed()  # another was chosen elsewhere
+        self._show(now, before)
 
     def _show(self, now: Preparation, before: Preparation | None = None) -> None:
         """Update the fields that differ; others may be in use."""
         if before is None or now.names != before.names:
-            self._typing.stop()
-            names = now.names
-            if before is not None and names.station == before.names.station:
-                names = replace(names, station=self._names.value().station)
-            self._names.set_value(names)
+            self._names.set_value(now.names, None if before is None else before.names)
         if before is None or now.names.station != before.names.station:
             self._names.set_stations(self._selection.stations())
         if now.limits != self._limits.value():

@@ -169,6 +169,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     def left(self) -> None:
         self._control.stop()
         self._entries.settle()
+        self._entries.forget_typed()
 
     @override
     def shut_down(self) -> None:

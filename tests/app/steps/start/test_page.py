@@ -46,6 +46,7 @@ from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.start.day_view import DayView, TemperatureField
 from lightpen_app.steps.start.interrupted_panel import InterruptedItem, InterruptedPanel
+from lightpen_app.steps.start.library_control import TYPING_PAUSE_MS
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.page import MainAction
@@ -336,13 +337,38 @@ def test_a_tip_has_its_ball_again_after_another_was_chosen_from_the_list(
     assert workbench.selection.preparation.names.tip == "T-99"
 
 
+@pytest.mark.parametrize("pause_ms", [0, 2 * TYPING_PAUSE_MS])
+@pytest.mark.parametrize("ball", ["10", "4.5"])  # as of the tip before, and another
+@pytest.mark.parametrize("order", ["ball first", "tip first", "tip in parts"])
 def test_a_ball_that_is_typed_with_another_tip_stays(
-    start: Opened, workbench: Workbench
+    start: Opened,
+    workbench: Workbench,
+    qtbot: QtBot,
+    order: str,
+    ball: str,
+    pause_ms: int,
 ) -> None:
-    start.type_into("Probe tip", "T-98")
-    start.type_into("Ball diameter", "4.5")
+    accepted(workbench, timedelta(3), tip="T-9", ball=5.0)
+    assert workbench.selection.preparation.names.ball_diameter == 10.0
+    typed: dict[str, tuple[str, ...]] = {
+        "Ball diameter": (ball,),
+        "Probe tip": ("T-98",),
+    }
+    if order == "tip in parts":  # the first part is the name of another tip
+        typed["Probe tip"] = ("T-9", "8")
+    for name in sorted(typed, reverse=order == "tip first"):
+        start.type_into(name, "", end=None)
+        for part in typed[name]:
+            QTest.keyClicks(focused(), part)
+            qtbot.wait(pause_ms)
+        QTest.keyClick(focused(), Key.Key_Tab)
+        start.settle()
 
-    assert workbench.selection.preparation.names.ball_diameter == 4.5
+    assert workbench.selection.preparation.names.ball_diameter == float(ball)
+    assert start.text_of("Ball diameter") == f"{float(ball):.4f} mm"
+    start.page.left()
+    start.type_into("Probe tip", "T-97")
+    assert start.text_of("Ball diameter") == "Not specified"
 
 
 # Stations
