@@ -12,7 +12,6 @@ from lightpen.record.library.tip_library import ItemKind
 from lightpen_app.shell.menus import About, HelpWindow
 from lightpen_app.steps.camera.intrinsics_panel import PartDialog
 from lightpen_app.steps.review.result_export import LaboratoryDialog
-from lightpen_app.steps.start.item_form import ItemForm, TipPicture
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, LimitsDialog
 from lightpen_app.widgets.fitting import FRAME, DialogScroll, fitted_place
@@ -25,8 +24,8 @@ SMALL = QSize(853, 533)  # 1280 x 800 at 150 %
 Made = Callable[[Workbench], QWidget]
 
 
-def library(workbench: Workbench) -> LibraryDialog:
-    return LibraryDialog(workbench.folder)
+def library(_: Workbench) -> LibraryDialog:
+    return LibraryDialog()
 
 
 def library_form(workbench: Workbench) -> LibraryDialog:
@@ -85,19 +84,3 @@ def test_all_limits_are_seen_without_scrolling_where_the_screen_has_room(
     assert dialog.size().boundedTo(room - FRAME) == dialog.size()
     buttons = dialog.findChildren(QPushButton)
     assert all(button.icon().isNull() for button in buttons)
-
-
-def test_the_picture_of_a_tip_is_seen_whole_in_a_small_dialog(
-    dressed: QApplication, qtbot: QtBot, workbench: Workbench
-) -> None:
-    dialog = library_form(workbench)
-    qtbot.addWidget(dialog)
-    dialog.show()
-    dialog.resize(dialog.size().boundedTo(SMALL - FRAME))
-    dressed.processEvents()
-
-    form = dialog.findChild(ItemForm)
-    assert isinstance(form, ItemForm)
-    picture = form.findChild(TipPicture)
-    assert isinstance(picture, TipPicture)
-    assert picture.visibleRegion().boundingRect().width() == picture.width()

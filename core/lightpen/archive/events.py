@@ -38,12 +38,7 @@ from lightpen.record.library.supervision import (
     read_limits_change,
     read_supervision,
 )
-from lightpen.record.library.tip_library import (
-    ItemKind,
-    ListedTip,
-    item_entries,
-    read_change,
-)
+from lightpen.record.library.tip_library import ItemKind, item_entries, read_change
 from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.record.results.result_folder import RESULT, SIMULATED, FolderArchive
 from lightpen.record.results.results import Result
@@ -95,9 +90,7 @@ def event_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a change of the tip library."""
     content, change = read_bytes(file, RESULT, LARGEST_RECORD), read_change(file)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
-    item, picture = change.item, None
-    if isinstance(item, ListedTip):
-        picture = item.picture
+    item = change.item
     event = Event(
         kind=Kind.LIBRARY,
         at=change.at,
@@ -112,7 +105,6 @@ def event_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
         reason=change.reason,
         settings=item_entries(item) | {"supervisor": change.supervisor},
         result=place,
-        files=() if picture is None else (FileHash(picture.place, picture.sha256),),
         record_sha256=place.sha256,
     )
     return ExtractedEvent(event, file_text(content))

@@ -36,7 +36,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
             metavar="ENTRY=VALUE",
             help="entries by the names that list --json prints, such as "
             "ball_diameter_mm=3.0005, due=2027-03-31, nominal_tip_mm='0 -90 -25', "
-            "is_retired=true, or picture=FILE; without a value the entry is cleared",
+            "or is_retired=true; without a value the entry is cleared",
         )
         _add_author(action)
 

@@ -19,7 +19,6 @@ from lightpen.record.library.library_changes import (
     Author,
     add_item,
     change_item,
-    keep_picture,
     known_item,
 )
 from lightpen.record.library.tip_library import (
@@ -33,7 +32,7 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 
-VECTOR, PICTURE = "nominal_tip_mm", "picture"
+VECTOR = "nominal_tip_mm"
 NOT_ENTERED = ("id", "led_file", "bending")  # stated otherwise
 
 
@@ -92,7 +91,7 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
             )
         entries.pop(name)
         if text:
-            entries[name] = _value(name, text, options)
+            entries[name] = text.split() if name == VECTOR else text
         try:
             item = convert(entries, type(item), strict=False)
         except ValidationError as error:
@@ -100,14 +99,6 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
                 "library.bad-entry", entry=name, value=printable(text), why=str(error)
             ) from error
     return item
-
-
-def _value(name: str, text: str, options: argparse.Namespace) -> Any:
-    if name == VECTOR:
-        return text.split()
-    if name == PICTURE:
-        return to_builtins(keep_picture(data_of(options), Path(text)))
-    return text
 
 
 def _author(options: argparse.Namespace) -> Author:

@@ -168,7 +168,7 @@ class DayControl(QObject):
         self._selection.set_preparation(chosen)
 
     def _on_tip_entered(self, text: str) -> None:
-        """Choose the only tip that matches; else take it for a barcode."""
+        """Choose the only tip that matches; else find it in the library."""
         rows = self._view.rows()
         exact = [row for row in rows if row.tip.casefold() == text.casefold()]
         matching = exact or [row for row in rows if row.matches(text)]

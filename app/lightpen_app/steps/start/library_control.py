@@ -1,30 +1,16 @@
-"""The tip library at the step Start: lists, dialog and barcodes."""
+"""The tip library at the step Start: lists, dialog, and tips typed or scanned."""
 
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from msgspec import structs
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent, QWindow
+from PySide6.QtCore import QCoreApplication, QObject, QTimer, Signal
 from PySide6.QtWidgets import QWidget
-from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.names import Origin
-from lightpen.record.library.library_changes import (
-    Author,
-    add_item,
-    change_item,
-    keep_picture,
-)
-from lightpen.record.library.tip_library import (
-    SWUNG,
-    AnyItem,
-    ItemKind,
-    Library,
-    ListedTip,
-)
+from lightpen.record.library.library_changes import Author, add_item, change_item
+from lightpen.record.library.tip_library import SWUNG, ItemKind, Library, ListedTip
 from lightpen.swing.preparation import NO_SOURCE, Preparation, SourceKind
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.words import shortened
@@ -33,142 +19,20 @@ from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog, RequestedChange
 from lightpen_app.steps.start.limits_dialog import AssumptionsPanel
 from lightpen_app.widgets.bars import Question, QuestionBar
-from lightpen_app.widgets.controls import ENTER_KEYS, WidgetMixin
 from lightpen_app.widgets.state_banner import status_message
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.workbench import Workbench
 
-PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
-PATIENCE_MS = 60  # without a key that end a scan
-SHORTEST = 3  # characters; a hand may hit two keys at once
-MODIFIERS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
-SHIFTS = (Qt.Key.Key_Shift, Qt.Key.Key_CapsLock)
-
-
-class BarcodeListener(QObject):
-    """Intercepts a barcode and its Enter in a window, wherever the focus is.
-
-    Keys are held back for an imperceptible moment and forwarded unless they are a
-    barcode. The windowing system stamps their times, so keys that waited for a busy
-    program are not mistaken for a scanner's.
-    """
-
-    scanned = Signal(str)  # the characters of a barcode
-
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._window: QWindow | None = None
-        self._held: list[QKeyEvent] = []
-        self._last_ms = 0
-        self._hands_on = False
-        self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
-
-        # Connections
-        self._patience.timeout.connect(self._release)
-
-    def listen(self, window: QWindow | None) -> None:
-        """Listen to the keys of another window, or of none."""
-        if self._window is not None:
-            self._release()
-            self._window.removeEventFilter(self)
-        self._window = window
-        if window is not None:
-            window.installEventFilter(self)
-
-    def takes(self, event: QEvent) -> bool:
-        """Accept a key of a barcode before it is taken for a shortcut."""
-        if not (isinstance(event, QKeyEvent) and self.is_continuation(event)):
-            return False
-        event.accept()
-        return True
-
-    def is_continuation(self, event: QKeyEvent) -> bool:
-        """Return whether a key continues the held-back ones."""
-        pressed = event.timestamp()
-        return bool(self._held) and pressed - self._last_ms <= PACE_MS
-
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if self._hands_on or not isinstance(event, QKeyEvent):
-            return False
-        if event.type() != QEvent.Type.KeyPress or event.key() in SHIFTS:
-            return False
-        if self._held and not self.is_continuation(event):
-            self._release()
-        if event.key() in ENTER_KEYS:
-            return self._ends_with(event)
-        if not _is_of_barcode(event) or (event.text() == " " and not self._held):
-            self._release()
-            return False
-        self._held.append(event.clone())
-        self._last_ms = event.timestamp()
-        self._patience.start()
-        return True
-
-    def _ends_with(self, event: QKeyEvent) -> bool:
-        """Report the barcode ended by Enter, or pass the keys on."""
-        code = "".join(each.text() for each in self._held)
-        if len(code) < SHORTEST:
-            self._release()
-            return False
-        self._patience.stop()
-        self._held.clear()
-        self.scanned.emit(code.strip())
-        return True
-
-    def _release(self) -> None:
-        """Pass the held-back keys on."""
-        self._patience.stop()
-        held, self._held = self._held, []
-        self._hands_on = True
-        for each in held:
-            if self._window is not None:
-                QCoreApplication.sendEvent(self._window, each)
-        self._hands_on = False
-
-
-class HearsBarcodes(WidgetMixin):
-    """Mixin before the base of a widget: listens to barcodes while it is shown."""
-
-    barcodes: BarcodeListener
-
-    @override
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self.barcodes.listen(self.window().windowHandle())
-
-    @override
-    def hideEvent(self, event: QHideEvent) -> None:
-        super().hideEvent(event)
-        self.barcodes.listen(None)
-
-    @override
-    def event(self, event: QEvent) -> bool:
-        """Keep the keys of a barcode from triggering shortcuts."""
-        if event.type() == QEvent.Type.ShortcutOverride:
-            return self.barcodes.takes(event) or super().event(event)
-        return super().event(event)
-
-
-def _is_of_barcode(event: QKeyEvent) -> bool:
-    text = event.text()
-    return (
-        len(text) == 1
-        and text.isprintable()
-        and not event.isAutoRepeat()
-        and not event.modifiers() & ~MODIFIERS
-    )
-
 
 class LibraryControl(QObject):
-    """Keeps the lists and the dialog of the library, and answers barcodes.
+    """Keeps the lists and the dialog of the library, and finds tips by their codes.
 
-    The question asks whether to add an unknown barcode.
+    The question asks whether to add an unknown one.
     """
 
-    # ItemKind, str: an item was chosen, in a list, in the dialog or by its barcode
+    # ItemKind, str: an item was chosen, in a list, in the dialog or by its code
     chosen = Signal(object, str)
-    unknown_declined = Signal()  # barcode of an unknown tip that is not to be added
+    unknown_declined = Signal()  # an unknown tip is not to be added
 
     def __init__(
         self,
@@ -187,11 +51,9 @@ class LibraryControl(QObject):
         self._question = question
         self._dialog: LibraryDialog | None = None  # until it is opened first
         self._unknown = ""
-        self.barcodes = BarcodeListener(self)
 
         # Connections
         self._watch.changed.connect(self.refresh)
-        self.barcodes.scanned.connect(self.take_code)
         names.item_chosen.connect(self.chosen)
         names.library_requested.connect(self.open)
         question.agreed.connect(self._on_agreed)
@@ -224,7 +86,7 @@ class LibraryControl(QObject):
         return self._watch.library.tip(name)
 
     def _made_dialog(self) -> LibraryDialog:
-        dialog = LibraryDialog(self._folder, self._page)
+        dialog = LibraryDialog(self._page)
 
         # Connections
         self._watch.change_kept.connect(dialog.show_kept)
@@ -246,7 +108,7 @@ class LibraryControl(QObject):
         return tuple(found)
 
     def take_code(self, code: str) -> None:
-        """Choose the tip of a barcode; offer to add one that is not known."""
+        """Choose the tip of a code; offer to add one that is not known."""
         tip = self._watch.library.tip(code)
         if tip is None:
             self._unknown = code
@@ -262,9 +124,6 @@ class LibraryControl(QObject):
             )
             return
         self.chosen.emit(ItemKind.TIP, tip.id)
-        self._notices.show_status(
-            self.tr("Tip {0} selected by barcode.").format(tip.id)
-        )
 
     def _asking(self) -> Question:
         words = self.tr("Tip {0} is not in the tip library. Add it?")
@@ -289,13 +148,9 @@ class LibraryControl(QObject):
 def _changed(
     folder: Path, asked: RequestedChange, by: Author, now: datetime
 ) -> Library:
-    """Make a change; its picture first."""
-    item: AnyItem = asked.item
-    if asked.picture and isinstance(item, ListedTip):
-        item = structs.replace(item, picture=keep_picture(folder, Path(asked.picture)))
     if asked.is_new:
-        return add_item(folder, item, by, now)
-    return change_item(folder, item, by, now, asked.before)
+        return add_item(folder, asked.item, by, now)
+    return change_item(folder, asked.item, by, now, asked.before)
 
 
 TYPING_PAUSE_MS = 400  # after which what was typed is taken over
@@ -402,7 +257,7 @@ class EntryPresenter(QObject):
             self._selection.set_preparation(replace(now, names=names))
 
     def _on_unknown_declined(self) -> None:
-        """Ask for the tip again: the barcode belongs to another one."""
+        """Ask for the tip again: the code belongs to another one."""
         self._take_names()
         now = self._selection.preparation
         self._selection.set_preparation(now.renamed(replace(now.names, tip="")))

@@ -1,10 +1,9 @@
 """The tip library: pens, tips and cones with their state, limits and due dates."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QModelIndex, QSize, Qt, Signal
+from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -30,7 +29,7 @@ from lightpen.record.library.tip_library import (
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, colors_of, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.start.item_form import ItemForm, TipPicture, kept_picture
+from lightpen_app.steps.start.item_form import ItemForm
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import EnterEdit, SupervisorFields, Translated
 from lightpen_app.widgets.fitting import FittedWindow
@@ -42,7 +41,6 @@ LEAST_ROWS = 7
 WIDTHS = (11, 16, 12, 11, 15, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
 LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
-PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
 KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE, ItemKind.CAMERA, ItemKind.REFERENCE)
 LONGEST_REASON = 200  # characters
 
@@ -52,7 +50,6 @@ class RequestedChange:
     """A change that is requested."""
 
     item: AnyItem
-    picture: str  # path of a new picture; empty for none
     is_new: bool  # whether to add the item
     reason: str
     signature: Signature | None  # signature of a supervisor, if one is required
@@ -60,19 +57,14 @@ class RequestedChange:
 
 
 class LibraryDialog(FittedWindow, Translated, QDialog):
-    """Lists the items of the library; adds, changes and retires them.
-
-    Pictures are kept in the data folder.
-    """
+    """Lists the items of the library; adds, changes and retires them."""
 
     change_asked = Signal(object)  # RequestedChange
     chosen = Signal(object, str)  # ItemKind, str: item to calibrate with
 
-    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.say(self, self.tr("Tip library"))
-        self._folder = folder
-        self._pictured: ListedTip | None = None
         self._statuses = StationStatus()
         self._pen = ""
         self._is_guarded = False
@@ -115,7 +107,6 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
-        self._picture = TipPicture(PICTURE_SIZE)
         self._retired = self.say(QCheckBox(), self.tr("Show retired items"))
         self._use = self.make_button(self.tr("Choose"), self._on_use_clicked)
         self._add = self.make_button(self.tr("Add..."))
@@ -125,7 +116,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._panel = QFrame()
         self._panel.setProperty("area", "panel")
         self._what = text_label(TextSize.LEAD)
-        self.form = ItemForm(folder)
+        self.form = ItemForm()
         reason = self.tr("Reason for change")
         self._reason = self.say(EnterEdit(maxLength=LONGEST_REASON), hint=reason)
         self._supervisor = SupervisorFields()
@@ -141,14 +132,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         vertical_layout(self, (self._list, 1), self._panel, spacing=-1, margins=margins)
         listed = vertical_layout(self._list, self._lead)
         horizontal_layout(listed, (self._tabs, 1), self._retired, spacing=-1)
-        top = Qt.AlignmentFlag.AlignTop
-        horizontal_layout(
-            listed,
-            (self._table, 1),
-            (self._picture, 0, top),
-            spacing=2 * GRID,
-            stretch=1,
-        )
+        listed.addWidget(self._table, 1)
         horizontal_layout(
             listed, self._use, self._add, self._edit, self._retire, 1, self._close
         )
@@ -334,25 +318,15 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         item = self.form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None
         self._fault.set_value(StatusMessage())
-        picture = self.form.picture() if is_typed else ""
         reason = self._reason.text().strip()
         self._asked = RequestedChange(
-            item, picture, self._is_new, reason, signature, self._before
+            item, self._is_new, reason, signature, self._before
         )
         self._refresh()
         self.change_asked.emit(self._asked)
 
-    def _show_picture(self, item: AnyItem | None) -> None:
-        """Show the picture of the tip that is chosen, if it has one."""
-        pictured = item if isinstance(item, ListedTip) and item.picture else None
-        self._picture.setVisible(pictured is not None)
-        if pictured is not None and pictured != self._pictured:
-            self._picture.set_value(kept_picture(self._folder, pictured))
-        self._pictured = pictured
-
     def _refresh(self) -> None:
         item = self.current()
-        self._show_picture(item)
         nothing = "" if item is not None else self.tr("Select an item in the table.")
         is_retired = item is not None and item.is_retired
         why_not = self.tr("This item is retired.") if is_retired else nothing

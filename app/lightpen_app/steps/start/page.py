@@ -13,11 +13,7 @@ from lightpen_app.steps.start.day_control import DayControl
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
-from lightpen_app.steps.start.library_control import (
-    EntryPresenter,
-    HearsBarcodes,
-    LibraryControl,
-)
+from lightpen_app.steps.start.library_control import EntryPresenter, LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
 from lightpen_app.steps.start.result_panel import LastResultPanel, LastResultPresenter
 from lightpen_app.steps.start.setup_view import SetupView, WelcomeControl, WelcomeView
@@ -30,7 +26,7 @@ from lightpen_app.work.workbench import Workbench
 DAY, SETUP, WELCOME = range(3)  # the views
 
 
-class StartPage(HearsBarcodes, ResponsiveLayout, Page):
+class StartPage(ResponsiveLayout, Page):
     """Shows the day page; on request the set-up; before all, how to begin."""
 
     key = "start"
@@ -64,7 +60,6 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
             self._selection, self._library, setup.names, setup.limits, setup.assumed
         )
         self._control = DayControl(workbench, services, self._library, self._day)
-        self.barcodes = self._library.barcodes
 
         # Layout
         bars = self._unknown_code, self._interrupted

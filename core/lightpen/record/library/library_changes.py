@@ -3,16 +3,12 @@
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
-from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from msgspec import structs
 
-from lightpen.errors import FileError, NameTakenError, UsageError
-from lightpen.formats.files import MEGABYTE, create_whole, read_bytes
-from lightpen.formats.image_headers import read_image_header
+from lightpen.errors import NameTakenError, UsageError
 from lightpen.formats.own_json import FORMAT, json_bytes, with_checksum
 from lightpen.messages import Message, message, printable
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
@@ -33,21 +29,17 @@ from lightpen.record.library.tip_library import (
     LARGEST_CHANGE,
     LIBRARY,
     LONGEST_ID,
-    PICTURES,
     AnyItem,
     Item,
     ItemKind,
     Library,
     LibraryChange,
     ListedTip,
-    Picture,
     read_library,
 )
 
 LARGEST_PLACE = 10_000.0  # mm
 SEPARATORS = set("/\\")  # of folders
-LARGEST_PICTURE = 8 * MEGABYTE
-PICTURE = message("file.picture")
 
 
 @dataclass(frozen=True)
@@ -110,33 +102,6 @@ def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
     if found is None:
         raise UsageError(no_such_item(kind, name))
     return found
-
-
-def read_picture(file: Path) -> bytes:
-    """Return the content of a file that holds a picture."""
-    content = read_bytes(file, PICTURE, LARGEST_PICTURE)
-    read_image_header(BytesIO(content), printable(str(file)))
-    return content
-
-
-def read_kept_picture(data: Path, picture: Picture) -> bytes:
-    """Return the content of a picture in the data folder, the one that was kept."""
-    file = data / picture.place
-    content = read_picture(file)
-    if sha256(content).hexdigest() != picture.sha256:
-        raise FileError("library.other-picture", path=file)
-    return content
-
-
-def keep_picture(data: Path, file: Path) -> Picture:
-    """Copy a picture into the data folder, named by its hash; return its path."""
-    content = read_picture(file)
-    digest = sha256(content).hexdigest()
-    kept = data / LIBRARY / PICTURES / f"{digest[:16]}{file.suffix.lower()}"
-    make_folder(kept.parent)
-    with suppress(NameTakenError):  # the same picture, of another item
-        create_whole(kept, content)
-    return Picture(kept.relative_to(data).as_posix(), digest)
 
 
 def no_such_item(kind: ItemKind, name: str) -> Message:

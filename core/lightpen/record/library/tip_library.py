@@ -42,7 +42,6 @@ from lightpen.record.library.entered_files import entered_files, numbered_files
 from lightpen.record.library.supervision import read_supervision
 
 LIBRARY = "library"
-PICTURES = "pictures"  # sub-folder
 WHAT = message("file.library")
 LONGEST_ID = 200  # characters
 LARGEST_BALL = 100.0  # mm
@@ -72,13 +71,6 @@ KIND_WORDS: Mapping[ItemKind, Message] = {
     ItemKind.CAMERA: message("library.camera"),
     ItemKind.REFERENCE: message("library.reference"),
 }
-
-
-class Picture(Struct, frozen=True):
-    """A picture of an item: its file, from the data folder, and its hash."""
-
-    place: str
-    sha256: Digest
 
 
 class Item(Struct, frozen=True, kw_only=True):
@@ -170,7 +162,6 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     # `DueRule` of its own; None: the station's
     max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
     max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
-    picture: Picture | None = None
     bending: MeasuredBending | None = None  # by its last press test
 
     @property

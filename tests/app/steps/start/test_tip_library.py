@@ -1,4 +1,4 @@
-"""The tip library at the step Start: lists, its dialog, marks, and barcodes."""
+"""The tip library at the step Start: lists, its dialog, marks, and codes."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,8 +8,7 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
-from PySide6.QtGui import QColor, QImage, QKeyEvent
+from PySide6.QtCore import QCoreApplication, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
@@ -33,8 +32,6 @@ from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.day_state import tip_details
 from lightpen_app.steps.start.form import NamesForm
-from lightpen_app.steps.start.item_form import TipPicture
-from lightpen_app.steps.start.library_control import PACE_MS
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.widgets.bars import QuestionBar
@@ -131,16 +128,12 @@ class Desk:
         QTest.keySequence(field, "Ctrl+A")
         QTest.keyClicks(field, text)
 
-    def scan(self, code: str, pace_ms: int = 5, at: int = 100_000) -> None:
-        """Let a scanner, or somebody, type a barcode and Enter into the window."""
-        keys = [(ord(each.upper()), each) for each in code] + [
-            (Qt.Key.Key_Return, "\r")
-        ]
-        for n, (key, text) in enumerate(keys):
-            for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-                event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, text)
-                event.setTimestamp(at + n * pace_ms)
-                QCoreApplication.sendEvent(self.page.window().windowHandle(), event)
+    def scan(self, code: str) -> None:
+        """Let a scanner, or somebody, type a barcode and Enter on the day page."""
+        self.page.show_day()
+        self.enter("Search tips", code)
+        QTest.keyClick(self.control("Search tips"), Qt.Key.Key_Return)
+        self.page.show_setup()
 
     def text_of(self, name: str) -> str:
         field = self.control(name)
@@ -381,52 +374,6 @@ def test_why_a_change_was_not_kept_is_reported_though_the_dialog_was_left(
     assert "The tip T-11 is in the library already." in desk.reported[-1]
 
 
-def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
-    desk: Desk, tmp_path: Path
-) -> None:
-    photo = tmp_path / "photo.png"
-    red = QImage(640, 320, QImage.Format.Format_RGB32)
-    red.fill(QColor("red"))
-    red.save(str(photo))
-    other = tmp_path / "other.txt"
-    other.write_text("no picture")
-    desk.add(ListedTip(id="T-10-80"), ListedTip(id="T-20"))
-    desk.names.library_requested.emit(ItemKind.TIP)
-
-    def seen() -> list[TipPicture]:
-        found = desk.dialog.findChildren(TipPicture)
-        return [each for each in found if each.isVisible()]
-
-    assert not seen()
-    desk.click("Change...")
-    (preview,) = seen()
-    assert preview.text() == "No picture"
-    for file, is_picture in ((other, False), (photo, True)):
-        desk.enter("Picture", str(file))
-        QTest.keyClick(desk.control("Picture"), Qt.Key.Key_Return)
-        desk.settle()
-        assert preview.pixmap().isNull() is not is_picture
-    assert_red(preview)
-    desk.click("Save")
-    desk.settle()
-
-    (kept,) = seen()
-    desk.settle()
-    assert_red(kept)
-    (file,) = (desk.data / "library" / "pictures").iterdir()
-    red.fill(QColor("blue"))
-    red.save(str(file))
-    desk.click("Change...")
-    desk.settle()
-    assert "was modified after it was saved." in preview.text()
-
-
-def assert_red(picture: TipPicture) -> None:
-    shown = picture.pixmap().toImage()
-    assert shown.width() == 2 * shown.height() == picture.width()
-    assert shown.pixelColor(shown.rect().center()) == QColor("red")
-
-
 def test_what_makes_no_sense_is_reported_in_the_dialog_and_nothing_is_kept(
     desk: Desk,
 ) -> None:
@@ -491,23 +438,6 @@ def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
 # Barcodes
 
 
-@pytest.mark.parametrize("focus", ["Operator", "Ball diameter", "All limits..."])
-def test_a_barcode_chooses_its_tip_wherever_the_focus_is(
-    desk: Desk, focus: str
-) -> None:
-    desk.add(TIP)
-    field = desk.control(focus)
-    field.setFocus()
-    before = desk.workbench.selection.preparation.names.operator
-    desk.scan("T-7")
-
-    now = desk.workbench.selection.preparation.names
-    assert (now.tip, now.ball_diameter, now.operator) == ("T-7", 6.0, before)
-    assert desk.text_of("Operator") == before
-    assert desk.reported[-1] == "Tip T-7 selected by barcode."
-    assert field.hasFocus()
-
-
 def test_a_tip_that_is_scanned_again_keeps_what_the_library_does_not_tell(
     desk: Desk,
 ) -> None:
@@ -515,7 +445,7 @@ def test_a_tip_that_is_scanned_again_keeps_what_the_library_does_not_tell(
     desk.scan("T-8")
     desk.enter("Ball diameter", "4.5")
     QTest.keyClick(desk.control("Ball diameter"), Qt.Key.Key_Return)
-    desk.scan("T-8", at=200_000)
+    desk.scan("T-8")
 
     assert desk.workbench.selection.preparation.names.ball_diameter == 4.5
 
@@ -525,43 +455,10 @@ def test_a_tip_that_is_scanned_again_keeps_what_the_library_does_not_tell(
     assert desk.text_of("Ball diameter") == "4.5000 mm"
 
     desk.add(TIP)
-    desk.scan("T-7", at=300_000)
-    desk.scan("T-8", at=400_000)
+    desk.scan("T-7")
+    desk.scan("T-8")
 
     assert desk.workbench.selection.preparation.names.ball_diameter is None
-
-
-def test_what_a_hand_types_stays_in_its_field(desk: Desk) -> None:
-    desk.add(TIP)
-    field = desk.control("Operator")
-    field.setFocus()
-    QTest.keySequence(field, "Ctrl+A")
-    desk.scan("T-7", pace_ms=2 * PACE_MS)
-
-    assert desk.text_of("Operator") == "T-7"
-    assert desk.workbench.selection.preparation.names.tip != "T-7"
-
-
-def test_two_keys_hit_at_once_are_no_barcode(desk: Desk) -> None:
-    field = desk.control("Operator")
-    field.setFocus()
-    QTest.keySequence(field, "Ctrl+A")
-    desk.scan("Jo")
-
-    assert desk.text_of("Operator") == "Jo"
-
-
-def test_a_key_alone_comes_after_a_moment(desk: Desk) -> None:
-    field = desk.control("Operator")
-    field.setFocus()
-    QTest.keySequence(field, "Ctrl+A")
-    event = QKeyEvent(
-        *(QEvent.Type.KeyPress, ord("X"), Qt.KeyboardModifier.NoModifier, "X")
-    )
-    event.setTimestamp(5000)
-    QCoreApplication.sendEvent(desk.page.window().windowHandle(), event)
-
-    desk.qtbot.waitUntil(lambda: desk.text_of("Operator") == "X")
 
 
 def test_an_unknown_barcode_is_offered_to_be_added(desk: Desk) -> None:

@@ -5,21 +5,14 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, date, datetime
 from pathlib import Path
 
-import numpy as np
 import pytest
 from msgspec import structs
 from tests.entering import put_in, retire_item
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
-from lightpen.formats.decoding import encode_png
 from lightpen.formats.own_json import json_bytes, with_checksum
 from lightpen.model.limits import DueRule
-from lightpen.record.library.library_changes import (
-    Author,
-    add_item,
-    change_item,
-    keep_picture,
-)
+from lightpen.record.library.library_changes import Author, add_item, change_item
 from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (
     LIBRARY,
@@ -168,22 +161,6 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match="later version"):
         read_library(tmp_path)
-
-
-def test_a_picture_is_kept_by_its_hash_in_the_data_folder(tmp_path: Path) -> None:
-    photo = tmp_path / "tip.png"
-    photo.write_bytes(encode_png(np.zeros((4, 4), np.uint8)))
-
-    picture = keep_picture(tmp_path / "data", photo)
-    assert (tmp_path / "data" / picture.place).read_bytes() == photo.read_bytes()
-    assert keep_picture(tmp_path / "data", photo) == picture  # once is enough
-
-
-def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "tip.png").write_text("no picture")
-
-    with pytest.raises(FileError):
-        keep_picture(tmp_path / "data", tmp_path / "tip.png")
 
 
 def test_of_two_who_add_the_same_id_at_once_one_does(tmp_path: Path) -> None:
