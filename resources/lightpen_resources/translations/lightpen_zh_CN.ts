@@ -1680,14 +1680,6 @@
 <context>
     <name>ItemForm</name>
     <message>
-        <source>Picture of the tip</source>
-        <translation>测头图片</translation>
-    </message>
-    <message>
-        <source>Pictures (*.png *.jpg *.jpeg *.bmp)</source>
-        <translation>图片 (*.png *.jpg *.jpeg *.bmp)</translation>
-    </message>
-    <message>
         <source>Not specified</source>
         <translation>未指定</translation>
     </message>
@@ -1762,14 +1754,6 @@
     <message>
         <source>Ball diameter</source>
         <translation>测球直径</translation>
-    </message>
-    <message>
-        <source>Picture</source>
-        <translation>图片</translation>
-    </message>
-    <message>
-        <source>Browse...</source>
-        <translation>浏览...</translation>
     </message>
 </context>
 <context>
@@ -2143,10 +2127,6 @@
     <message>
         <source>choose another tip.</source>
         <translation>请另选一个。</translation>
-    </message>
-    <message>
-        <source>Tip {0} selected by barcode.</source>
-        <translation>已按条码选择测头 {0}。</translation>
     </message>
     <message>
         <source>Tip {0} is not in the tip library. Add it?</source>
@@ -4878,17 +4858,6 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>TipPicture</name>
-    <message>
-        <source>Picture of the tip</source>
-        <translation>测头图片</translation>
-    </message>
-    <message>
-        <source>No picture</source>
-        <translation>无图片</translation>
-    </message>
-</context>
-<context>
     <name>TipSummary</name>
     <message>
         <source>U (k = 2) of the tip in its weakest direction</source>
@@ -6904,10 +6873,6 @@ needed</source>
         <translation>光笔</translation>
     </message>
     <message>
-        <source>picture</source>
-        <translation>图片</translation>
-    </message>
-    <message>
         <source>pose file</source>
         <translation>位姿文件</translation>
     </message>
@@ -8202,10 +8167,6 @@ needed</source>
     <message>
         <source>The pen was swung about one axis only, {axis}: this axis turned by {found:.1f}° (RMS); {needed:.0f}° are needed, so the tip along it is not determined. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
-    </message>
-    <message>
-        <source>The picture {path} was modified after it was saved. Save it again.</source>
-        <translation>图片 {path} 在保存后被更改。请重新保存。</translation>
     </message>
     <message>
         <source>The points are up to {off:.3g} mm off a {kind}. Check the kind in the plan, and whether a point lies elsewhere.</source>
