@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import lightpen_extensions  # noqa: F401  # adds its messages
 from lightpen.messages import TRANSLATED
 from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS
 
@@ -48,8 +49,7 @@ def collect(
 
 def translated_templates() -> Iterator[str]:
     """Return the templates of all messages that are shown in other languages."""
-    for area in TRANSLATED:
-        yield from area.MESSAGES.values()
+    yield from TRANSLATED.values()
 
 
 def compile_ts(ts_file: Path, folder: Path) -> Path:

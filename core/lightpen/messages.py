@@ -13,22 +13,18 @@ from enum import StrEnum, unique
 from pathlib import Path
 from typing import TypeAlias, Union
 
-from lightpen.catalogue import (
-    cameras,
-    command_line,
-    estimation,
-    extensions,
-    files,
-    record,
-)
+from lightpen.catalogue import cameras, command_line, estimation, files, record
 
 Value: TypeAlias = Union[str, int, float, "Message", tuple["Message", ...]]
 Translate: TypeAlias = Callable[[str], str]
 
-TRANSLATED = (cameras, estimation, extensions, files, record)
-CATALOGUE: Mapping[str, str] = ChainMap(
-    *(area.MESSAGES for area in (*TRANSLATED, command_line))
-)
+# All templates that are shown in other languages; extensions add theirs by `update`.
+TRANSLATED = {
+    code: template
+    for area in (cameras, estimation, files, record)
+    for code, template in area.MESSAGES.items()
+}
+CATALOGUE: Mapping[str, str] = ChainMap(TRANSLATED, command_line.MESSAGES)
 
 
 def in_english(template: str) -> str:
