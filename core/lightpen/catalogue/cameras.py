@@ -43,6 +43,8 @@ MESSAGES = {
     "live.other-recording": "The two recordings have different numbers of images. Choose two simultaneous recordings.",
     "diagnosis.spots-do-not-fit": "Most images show {n_needed} or more spots, but these do not match the {n_leds} LEDs of the LED file. Check that the LED file belongs to this pen and the intrinsics file to these images.",
     "diagnosis.few-spots": "Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.",
+    "match.unseen": "LED {led} is not detected at its table position. It is covered, off, or its position is wrong.",
+    "match.misfit": "RMS residual {sigma:.2f} px; usual is {usual:g} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.",
     "cause.named": "The images agree with the files once this is corrected: {causes}.",
     "cause.one-of": "The images agree with the files once one of these is corrected: {causes}.",
     "cause.unknown": "No single mistake explains it. Check in this order: that the LED file belongs to this pen, the intrinsics file to this camera, lens and focus, and that no LED is blurred or reflected.",

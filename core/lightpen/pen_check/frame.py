@@ -20,7 +20,6 @@ from lightpen.model.pen import (
     in_pen_frame,
     pen_frame_from_raw,
 )
-from lightpen.pen_check.match import Finding, MatchFinding
 
 
 @dataclass(frozen=True)
@@ -131,9 +130,6 @@ def save_pen(pen: Pen, path: Path) -> OpenedPen:
     return open_pen(path)
 
 
-MEASURED_DECIMALS = 3  # mm; live images do not show an LED's place any finer
-
-
 def leds_to_exchange(frame: FrameCheck) -> tuple[int, int] | None:
     """Return the numbers of two LEDs that are swapped in the file."""
     error = frame.error
@@ -142,41 +138,9 @@ def leds_to_exchange(frame: FrameCheck) -> tuple[int, int] | None:
     return cast(int, error.values["first"]), cast(int, error.values["second"])
 
 
-def exchanged(pen: Pen, leds: Sequence[int], axes: str = "") -> Pen:
-    """Return a pen in which two LEDs swap these axes, or by default their places.
-
-    Parameters
-    ----------
-    pen : Pen
-        The pen.
-    leds : sequence of int
-        Numbers of the two LEDs.
-    axes : str
-        Such as "yz".
-    """
-    pair = np.asarray(leds) - 1
-    coordinates, normals = pen.leds.copy(), pen.normals.copy()
-    for column in map("xyz".index, axes or "xyz"):
-        coordinates[pair, column] = pen.leds[pair[::-1], column]
-    if not axes:
-        normals[pair] = pen.normals[pair[::-1]]
-    return replace(pen, leds=coordinates, normals=normals)
-
-
-def corrected(pen: Pen, finding: Finding) -> Pen:
-    """Return a pen corrected by a finding of live images that `can_be_corrected`.
-
-    Coordinates that are swapped between two LEDs are swapped back, and a displaced LED
-    gets its measured position. If either of two coordinates can be swapped, the one is
-    chosen that keeps the LEDs in the pen frame.
-    """
-    if finding.what is not MatchFinding.EXCHANGED:
-        leds = pen.leds.copy()
-        leds[finding.leds[0] - 1] += np.round(finding.by, MEASURED_DECIMALS)
-        return replace(pen, leds=leds)
-    pens = [
-        exchanged(pen, finding.leds, either.replace(", ", ""))
-        for either in finding.axes.split("/")
-    ]
-    fit = (each for each in pens if examine_frame(each).error is None)
-    return next(fit, pens[0])
+def exchanged(pen: Pen, leds: Sequence[int]) -> Pen:
+    """Return a pen in which two LEDs, by number, swap places."""
+    order = np.arange(pen.n_leds)
+    one, other = (led - 1 for led in leds)
+    order[[one, other]] = other, one
+    return replace(pen, leds=pen.leds[order], normals=pen.normals[order])

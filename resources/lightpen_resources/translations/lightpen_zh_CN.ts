@@ -1176,17 +1176,6 @@
     </message>
 </context>
 <context>
-    <name>FixableMessage</name>
-    <message>
-        <source>Swap {0} and {1}</source>
-        <translation>交换 {0} 和 {1}</translation>
-    </message>
-    <message>
-        <source>Use measured position</source>
-        <translation>采用测得的位置</translation>
-    </message>
-</context>
-<context>
     <name>FocusMeter</name>
     <message>
         <source>Saturated</source>
@@ -2559,36 +2548,8 @@
         <translation>LED 与图像相符，但与光笔坐标系不符。请看文件处的说明。</translation>
     </message>
     <message>
-        <source>All LEDs are within {0} mm of their table positions, in {1} views.</source>
-        <translation>在 {1} 个视图中，所有 LED 与表中位置相差不超过 {0} mm。</translation>
-    </message>
-    <message>
-        <source>{0} of LEDs {1} and {2} are swapped in the table.</source>
-        <translation>表格中 LED {1} 和 {2} 的 {0} 互换了。</translation>
-    </message>
-    <message>
-        <source>LED {0} is {1} mm from its file position. Measured: {2}, {3}, {4} mm.</source>
-        <translation>LED {0} 与文件中的位置相差 {1} mm。测得：{2}, {3}, {4} mm。</translation>
-    </message>
-    <message>
-        <source>LED {0} is not at its file position. Tilt and turn the pen to measure the deviation.</source>
-        <translation>LED {0} 与文件中的位置不符。请倾斜并转动光笔以测出偏差。</translation>
-    </message>
-    <message>
-        <source>LED {0} or {1} is {2} mm from its file position.</source>
-        <translation>LED {0} 或 {1} 与文件中的位置相差 {2} mm。</translation>
-    </message>
-    <message>
-        <source>LED {0} is not detected at its table position. It is covered, off, or its position is wrong.</source>
-        <translation>在表中位置未检测到 LED {0}。可能被遮住、未点亮，或位置有误。</translation>
-    </message>
-    <message>
-        <source>RMS residual {0} px; usual is {1} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.</source>
-        <translation>残差均方根 {0} px，通常不超过 {1} px。请检查 LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头。</translation>
-    </message>
-    <message>
-        <source>A light at {0}, {1}, {2} mm moves with the pen. Is an LED missing in the table?</source>
-        <translation>位于 {0}, {1}, {2} mm 的光点随光笔移动。表格中是否缺少一个 LED？</translation>
+        <source>All LEDs fit their table positions, in {0} views.</source>
+        <translation>在 {0} 个视图中，所有 LED 与表中位置相符。</translation>
     </message>
 </context>
 <context>
@@ -5501,6 +5462,10 @@ needed</source>
         <translation>LED {led} 的噪声高于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；已相应降低其权重。请清洁它，并检查亮度和供电。</translation>
     </message>
     <message>
+        <source>LED {led} is not detected at its table position. It is covered, off, or its position is wrong.</source>
+        <translation>在表中位置未检测到 LED {led}。可能被遮住、未点亮，或位置有误。</translation>
+    </message>
+    <message>
         <source>LED {led} is not where the LED file has it</source>
         <translation>LED {led} 不在 LED 文件所示的位置</translation>
     </message>
@@ -5791,6 +5756,10 @@ needed</source>
     <message>
         <source>QIF 3.0 results</source>
         <translation>QIF 3.0 结果</translation>
+    </message>
+    <message>
+        <source>RMS residual {sigma:.2f} px; usual is {usual:g} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.</source>
+        <translation>残差均方根 {sigma:.2f} px，通常不超过 {usual:g} px。请检查 LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头。</translation>
     </message>
     <message>
         <source>ROS (YAML)</source>

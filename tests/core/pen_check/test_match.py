@@ -1,9 +1,8 @@
 """The live match on exact disc images plus noise, of a pen that an operator swings."""
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -11,16 +10,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.spots import SpotFlaw, Spots
+from lightpen.messages import message
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
-from lightpen.pen_check.match import (
-    MAX_VIEWS,
-    Finding,
-    MatchFinding,
-    PenMatch,
-    add_view,
-    match_pen,
-)
+from lightpen.pen_check.match import MAX_VIEWS, Finding, PenMatch, add_view, match_pen
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
@@ -34,6 +27,10 @@ CAMERA = paper_camera()
 PEN = paper_pen()
 NOISE = 0.05  # px
 TWO_SECONDS = 40  # images
+
+
+def unseen(led: int) -> Finding:
+    return Finding(message("match.unseen", led=led), (led,))
 
 
 def seen(
@@ -109,7 +106,6 @@ def test_a_true_file_fits() -> None:
 
     assert match.fits
     assert match.n_labelled == match.n_views == len(SWUNG)
-    assert match.sigma == pytest.approx(NOISE, rel=0.15)  # of 300 centres
     np.testing.assert_allclose(match.rms, NOISE * np.sqrt(2), rtol=0.5)
 
 
@@ -124,66 +120,21 @@ def test_twenty_clean_swings_raise_no_alarm() -> None:
 
 @pytest.mark.slow
 def test_an_led_half_a_millimetre_off_is_named_within_two_seconds() -> None:
-    n_named, n_trials = 0, 30
-    for seed in range(n_trials):
+    named = []
+    for seed in range(20):
         rng = np.random.default_rng([seed, 1])
-        by = rng.normal(size=3)
+        by = rng.normal(size=2)
         by *= 0.5 / np.linalg.norm(by)
         led = int(rng.integers(1, 11))
-        match = match_pen(CAMERA, moved(led, (-by).tolist()), views_of(images(seed)))
-        findings = match.findings
-        if len(findings) == 1 and findings[0].leds == (led,):
-            n_named += 1
-            # Ten times the standard deviation of a shift by two seconds of views.
-            np.testing.assert_allclose(findings[0].by, by, atol=0.15)
-    assert n_named >= 0.95 * n_trials
+        match = match_pen(CAMERA, moved(led, (*by, 0.0)), views_of(images(seed)))
+        named.append([finding.leds for finding in match.findings] == [(led,)])
+    assert np.mean(named) >= 0.95
 
 
-def test_a_pen_held_still_names_the_led_but_not_by_how_much() -> None:
-    views = views_of(images(swings=False))
-
-    finding = the_finding(match_pen(CAMERA, moved(7, (0.5, 0.0, 0.0)), views))
-
-    assert (finding.what, finding.leds) == (MatchFinding.SHIFTED, (7,))
-    assert not finding.is_sure
-
-
-def test_an_led_far_off_is_found_among_the_spots_left_over() -> None:
+def test_an_led_far_off_is_not_detected_at_its_place() -> None:
     finding = the_finding(match_pen(CAMERA, moved(9, (0.0, 40.0, 5.0)), SWUNG))
 
-    assert (finding.what, finding.leds) == (MatchFinding.SHIFTED, (9,))
-    assert finding.is_sure
-    np.testing.assert_allclose(finding.by, [0.0, -40.0, -5.0], atol=0.1)
-
-
-def test_two_leds_off_are_both_named() -> None:
-    leds = PEN.leds.copy()
-    leds[2] += [0.6, 0.0, 0.0]
-    leds[7] += [0.0, 0.0, -0.8]
-
-    findings = match_pen(CAMERA, with_leds(leds), SWUNG).findings
-
-    assert [finding.leds for finding in findings] == [(8,), (3,)]
-
-
-@pytest.mark.slow
-def test_an_exchanged_coordinate_is_named() -> None:
-    views = SWUNG[::5]
-    wrong = []
-    for one, other in list(combinations(range(10), 2))[::3]:
-        for axis in range(3):
-            leds = PEN.leds.copy()
-            leds[[one, other], axis] = leds[[other, one], axis]
-            gaps = np.linalg.norm(leds[:, None] - PEN.leds, axis=2)
-            if np.all(gaps.min(axis=1) < 0.01):
-                continue  # the same LEDs under other numbers
-            findings = match_pen(CAMERA, with_leds(leds), views).findings
-            pair = (one + 1, other + 1)
-            # LEDs of one plane: exchanging x or y gives the same two places.
-            named = "x/y" if PEN.leds[one, 2] == PEN.leds[other, 2] else "xyz"[axis]
-            if findings != (Finding(MatchFinding.EXCHANGED, pair, axes=named),):
-                wrong.append((pair, axis, findings))
-    assert wrong == []
+    assert finding == unseen(9)
 
 
 def test_a_pen_fits_when_it_was_seen_in_views_enough() -> None:
@@ -202,27 +153,7 @@ def test_leds_exchanged_as_a_whole_fit_the_images() -> None:
 def test_an_led_that_is_off_is_named() -> None:
     views = views_of(images(hidden=5))
 
-    assert match_pen(CAMERA, PEN, views).findings == (
-        Finding(MatchFinding.UNSEEN, (6,)),
-    )
-
-
-def test_an_led_that_the_file_lacks_is_found_on_the_pen() -> None:
-    finding = the_finding(match_pen(CAMERA, with_leds(PEN.leds[:9]), SWUNG))
-
-    assert finding.what is MatchFinding.UNKNOWN_LED
-    np.testing.assert_allclose(finding.by, PEN.leds[9], atol=0.1)
-
-
-def test_a_file_with_twenty_leds_too_many_is_judged_as_fast_as_any() -> None:
-    beyond = np.full((20, 3), [0.0, 260.0, -40.0])
-    beyond[:, 0] = np.linspace(-60, 60, 20)
-
-    match = match_pen(CAMERA, with_leds(np.concatenate([PEN.leds[:8], beyond])), SWUNG)
-
-    # Two of the twenty are taken for LEDs 9 and 10 of the pen.
-    found = Counter(finding.what for finding in match.findings)
-    assert found == {MatchFinding.SHIFTED: 2, MatchFinding.UNSEEN: 18}
+    assert match_pen(CAMERA, PEN, views).findings == (unseen(6),)
 
 
 def test_a_mirrored_file_is_reported_as_such() -> None:
@@ -230,8 +161,7 @@ def test_a_mirrored_file_is_reported_as_such() -> None:
 
     finding = the_finding(match_pen(CAMERA, mirrored, SWUNG))
 
-    assert finding.what is MatchFinding.ADVICE
-    assert "mirror image" in str(finding.advice)
+    assert "mirror image" in str(finding.message)
 
 
 def test_another_pen_is_reported_as_such() -> None:
@@ -240,14 +170,16 @@ def test_another_pen_is_reported_as_such() -> None:
     match = match_pen(CAMERA, other, SWUNG)
 
     assert (match.n_labelled, match.fits) == (0, False)
-    assert "do not match the" in str(the_finding(match).advice)
+    assert "do not match the" in str(the_finding(match).message)
 
 
 def test_leds_that_are_all_a_little_off_are_a_misfit_of_none() -> None:
     rng = np.random.default_rng(4)
-    pen = replace(PEN, leds=PEN.leds + rng.normal(0, 0.05, PEN.leds.shape))
+    pen = replace(PEN, leds=PEN.leds + rng.normal(0, 0.1, PEN.leds.shape))
 
-    assert match_pen(CAMERA, pen, SWUNG).findings == (Finding(MatchFinding.MISFIT),)
+    finding = the_finding(match_pen(CAMERA, pen, SWUNG))
+
+    assert (finding.message.code, finding.leds) == ("match.misfit", ())
 
 
 def test_without_views_nothing_is_reported() -> None:

@@ -1,11 +1,9 @@
 """The live image, and the match of its LEDs with the table."""
 
-import math
 from collections import deque
 from collections.abc import Iterable
 
 import numpy as np
-from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGroupBox, QWidget
 from typing_extensions import override
@@ -13,15 +11,13 @@ from typing_extensions import override
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
-from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
-from lightpen.pen_check.shifts import MIN_SHIFT
+from lightpen.pen_check.match import PenMatch
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import number_text
-from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
@@ -33,57 +29,6 @@ from lightpen_app.widgets.state_banner import (
 )
 from lightpen_app.work.live_view import DisplayedImage
 
-
-class FixableMessage(Translated, QWidget):
-    """Shows a message with a button to correct it; hidden without one."""
-
-    correction_requested = Signal(object)  # Finding to correct: the button was pressed
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._finding: Finding | None = None
-
-        # Widgets
-        self._remark = SignLabel()
-        self._correct = PushButton()
-
-        # Layout
-        vertical_layout(self, self._remark, self._correct)
-
-        # Connections
-        self._correct.clicked.connect(self._on_correct_clicked)
-
-        self.hide()
-        self._retranslate()
-
-    def text(self) -> str:
-        """Return the text."""
-        return self._remark.value().text
-
-    def set_value(self, remark: StatusMessage) -> None:
-        """Show another remark."""
-        self._remark.set_value(remark)
-        self.setVisible(bool(remark.text))
-
-    def set_correctable(self, finding: Finding | None) -> None:
-        """Offer a correction, or none."""
-        self._finding = finding
-        self._correct.setVisible(finding is not None)
-        if finding is not None:
-            self._correct.setText(self._verb(finding))
-
-    def _verb(self, finding: Finding) -> str:
-        if finding.what is MatchFinding.EXCHANGED:
-            return self.tr("Swap {0} and {1}").format(*finding.leds)
-        return self.tr("Use measured position")
-
-    def _on_correct_clicked(self) -> None:
-        self.correction_requested.emit(self._finding)
-
-    def _retranslate(self) -> None:
-        self.set_correctable(self._finding)
-
-
 N_SMOOTHED = 20  # images that are reported together: one second
 N_FINDINGS = 4
 TALLEST = 0.9  # height of the image over its width; sensors are flatter
@@ -91,8 +36,6 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs and the match of each."""
-
-    correction_requested = Signal(object)  # Finding to correct in the table
 
     def __init__(self, foot: QWidget) -> None:
         super().__init__()
@@ -113,14 +56,10 @@ class MatchPanel(Translated, QGroupBox):
             ),
         )
         self._banner = StateBanner(TextSize.TITLE)
-        self._messages = tuple(FixableMessage() for _ in range(N_FINDINGS))
+        self._messages = tuple(SignLabel() for _ in range(N_FINDINGS))
 
         # Layout
         vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0, foot)
-
-        # Connections
-        for remark in self._messages:
-            remark.correction_requested.connect(self.correction_requested)
 
         self._retranslate()
 
@@ -171,16 +110,12 @@ class MatchPanel(Translated, QGroupBox):
         """Return the most serious finding of a match, a sentence; empty without one."""
         if match is None or not match.findings:
             return ""
-        return self._words(match.findings[0], match)
+        return worded(match.findings[0].message)
 
     def reasons(self) -> dict[int, str]:
         """Return the findings on LEDs, by number."""
         findings = () if self._match is None else self._match.findings
-        return {
-            led: self._words(each, self._match)
-            for each in findings
-            for led in each.leds
-        }
+        return {led: worded(each.message) for each in findings for led in each.leds}
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -198,10 +133,9 @@ class MatchPanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         found = self._found()
-        correctable = self._correctable()
         for i, remark in enumerate(self._messages):
             remark.set_value(found[i] if i < len(found) else StatusMessage())
-            remark.set_correctable(correctable[i] if i < len(correctable) else None)
+            remark.setVisible(i < len(found))
         self._refresh_state()
 
     def _refresh_state(self) -> None:
@@ -248,7 +182,7 @@ class MatchPanel(Translated, QGroupBox):
             return []
         if match.findings:
             remarks = [
-                StatusMessage.warning(self._words(each, match))
+                StatusMessage.warning(worded(each.message))
                 for each in match.findings[:N_FINDINGS]
             ]
         elif not match.fits:
@@ -261,69 +195,9 @@ class MatchPanel(Translated, QGroupBox):
             )
             remarks = [StatusMessage.warning(words)]
         else:
-            words = self.tr(
-                "All LEDs are within {0} mm of their table positions, in {1} views."
-            )
-            text = words.format(f"{MIN_SHIFT:g}", match.n_views)
-            remarks = [StatusMessage.good(text)]
+            words = self.tr("All LEDs fit their table positions, in {0} views.")
+            remarks = [StatusMessage.good(words.format(match.n_views))]
         return remarks
-
-    def _correctable(self) -> list[Finding | None]:
-        """Return the findings that a click can correct, in their places."""
-        if self._match is None or self._why_none:
-            return []
-        return [
-            each if each.can_be_corrected else None
-            for each in self._match.findings[:N_FINDINGS]
-        ]
-
-    def _words(self, finding: Finding, match: PenMatch | None) -> str:
-        place = [
-            f"{axis}\N{NO-BREAK SPACE}{number_text(each, 2)}"
-            for axis, each in zip("xyz", finding.by, strict=True)
-        ]
-        length = f"{math.hypot(*finding.by):.2f}"
-        match finding.what:
-            case MatchFinding.ADVICE:
-                return worded(finding.advice)
-            case MatchFinding.EXCHANGED:
-                words = self.tr("{0} of LEDs {1} and {2} are swapped in the table.")
-                return words.format(finding.axes, *finding.leds)
-            case MatchFinding.SHIFTED if finding.is_sure:
-                words = self.tr(
-                    "LED {0} is {1} mm from its file position. Measured: {2}, {3}, "
-                    "{4} mm."
-                )
-                return words.format(finding.leds[0], length, *place)
-            case MatchFinding.SHIFTED:
-                words = self.tr(
-                    "LED {0} is not at its file position. Tilt and turn the pen to "
-                    "measure the deviation."
-                )
-                return words.format(finding.leds[0])
-            case MatchFinding.SHIFTED_EITHER:
-                words = self.tr("LED {0} or {1} is {2} mm from its file position.")
-                return words.format(*finding.leds, length)
-            case MatchFinding.UNSEEN:
-                words = self.tr(
-                    "LED {0} is not detected at its table position. It is covered, "
-                    "off, or its position is wrong."
-                )
-                return words.format(finding.leds[0])
-            case MatchFinding.UNKNOWN_LED:
-                words = self.tr(
-                    "A light at {0}, {1}, {2} mm moves with the pen. Is an LED "
-                    "missing in the table?"
-                )
-                return words.format(*place)
-            case MatchFinding.MISFIT:
-                assert match is not None
-                words = self.tr(
-                    "RMS residual {0} px; usual is {1} px or less. Check that the "
-                    "LED file belongs to this pen and the intrinsics file to this "
-                    "camera and lens."
-                )
-                return words.format(_pixels(match.sigma), USUAL_SIGMA)
 
 
 def _pixels(sigma: float) -> str:

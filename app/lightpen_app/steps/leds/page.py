@@ -4,8 +4,8 @@ from PySide6.QtWidgets import QGroupBox
 from typing_extensions import override
 
 from lightpen.model.pen import Pen
-from lightpen.pen_check.frame import corrected, exchanged, leds_to_exchange
-from lightpen.pen_check.match import Finding, PenMatch
+from lightpen.pen_check.frame import exchanged, leds_to_exchange
+from lightpen.pen_check.match import PenMatch
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.face import Services, can_discover
 from lightpen_app.look.languages import worded
@@ -96,7 +96,6 @@ class LedsPage(ResponsiveLayout, Page):
         self._leds.table.led_chosen.connect(self._space.view.set_chosen)
         self._space.view.led_chosen.connect(self._leds.table.set_chosen)
         self._space.correct.clicked.connect(self._on_correct_clicked)
-        self._match.correction_requested.connect(self._on_correction_requested)
         self._matching.watch.value_changed.connect(self._on_match_changed)
         self._pens.changed.connect(self.changed)
         self._selection.changed.connect(self._on_selection_changed)
@@ -223,11 +222,6 @@ class LedsPage(ResponsiveLayout, Page):
     def _on_correct_clicked(self) -> None:
         if self._correction is not None:
             self._files.ask_place(self._correction)
-
-    def _on_correction_requested(self, finding: Finding) -> None:
-        opened = self._files.opened
-        if opened is not None and opened.sought is not None:
-            self._files.ask_place(corrected(opened.sought, finding))
 
     def _doubt_question(self) -> tuple[str, str]:
         """Return the question whether to swing with LEDs that do not fit.

@@ -84,11 +84,13 @@ def diagnose_mirror(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message
     return None if cause is None else message("cause.named", causes=cause)
 
 
-def cause_of_misfit(camera: Camera, pen: Pen, pixels: FloatArray) -> Message | None:
+def cause_of_misfit(
+    camera: Camera, pen: Pen, pixels: FloatArray, *, is_seated: bool = True
+) -> Message | None:
     """Name the causes that remove the misfit of labelled centres; None if none does.
 
     Several are named if they explain the images alike. ``pixels`` (N, L, 2) are the
-    centres, px, NaN where an LED was not seen.
+    centres, px, NaN where an LED was not seen. The tip rests where the pen is seated.
     """
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
     usable = np.flatnonzero(n_seen > MIN_POSE_LEDS)
@@ -97,10 +99,10 @@ def cause_of_misfit(camera: Camera, pen: Pen, pixels: FloatArray) -> Message | N
     spread = usable[np.linspace(0, len(usable) - 1, 3 * N_CENTERS).astype(int)]
     most = np.argsort(-n_seen[spread], kind="stable")[:N_CENTERS]
     some = pixels[np.unique(spread[most])]
-    limit = min(FITS, REMOVED * _misfit(camera, pen, some))
+    limit = min(FITS, REMOVED * _misfit(camera, pen, some, is_seated))
     tried = [
-        (_misfit(each.camera, each.pen, each.pixels), each.cause)
-        for each in _trials(camera, pen, some)
+        (_misfit(each.camera, each.pen, each.pixels, is_seated), each.cause)
+        for each in _trials(camera, pen, some, is_seated)
     ]
     least = min(misfit for misfit, _ in tried)
     if least > limit:
@@ -111,7 +113,9 @@ def cause_of_misfit(camera: Camera, pen: Pen, pixels: FloatArray) -> Message | N
     return message("cause.named", causes=alike)
 
 
-def _trials(camera: Camera, pen: Pen, pixels: FloatArray) -> Iterator[_Trial]:
+def _trials(
+    camera: Camera, pen: Pen, pixels: FloatArray, is_seated: bool
+) -> Iterator[_Trial]:
     """Yield the causes for labelled centres, the most usual first."""
     for one, other in combinations(range(pen.n_leds), 2):
         leds = pen.leds.copy()
@@ -130,9 +134,11 @@ def _trials(camera: Camera, pen: Pen, pixels: FloatArray) -> Iterator[_Trial]:
     yield _Trial(message("cause.axes-exchanged"), camera, pen, pixels[..., ::-1])
     yield _Trial(message("cause.binned"), camera, pen, 2 * pixels + 0.5)
     yield _Trial(message("cause.not-binned"), camera, pen, (pixels - 0.5) / 2)
-    cropped = _cropped(camera, pen, pixels)
-    if np.hypot(cropped.camera.cx - camera.cx, cropped.camera.cy - camera.cy) > CROPPED:
-        yield cropped
+    if is_seated:
+        cropped = _cropped(camera, pen, pixels)
+        off = cropped.camera.matrix[:2, 2] - camera.matrix[:2, 2]
+        if np.linalg.norm(off) > CROPPED:
+            yield cropped
     for led in range(pen.n_leds):
         others = np.where(np.arange(pen.n_leds)[:, None] == led, np.nan, pixels)
         yield _Trial(message("cause.moved", led=led + 1), camera, pen, others)
@@ -191,7 +197,7 @@ def _poses(camera: Camera, pen: Pen, pixels: FloatArray) -> Poses | None:
     return fit_poses(camera, pen, pixels, R, t)
 
 
-def _misfit(camera: Camera, pen: Pen, pixels: FloatArray) -> float:
+def _misfit(camera: Camera, pen: Pen, pixels: FloatArray, is_seated: bool) -> float:
     """Return the usual residual of the worst LED or of the tip, whichever is larger.
 
     As a standard deviation, px.
@@ -201,7 +207,9 @@ def _misfit(camera: Camera, pen: Pen, pixels: FloatArray) -> float:
         return NO_POSE
     lengths = np.linalg.norm(found.residuals, axis=2)
     seen = np.isfinite(lengths).any(axis=0)
-    of_tip = np.median(np.linalg.norm(_of_tip(found, camera), axis=1))
+    of_tip = 0.0
+    if is_seated:
+        of_tip = float(np.median(np.linalg.norm(_of_tip(found, camera), axis=1)))
     worst = np.nanmedian(lengths[:, seen], axis=0).max()
     return float(max(worst, of_tip)) / MEDIAN_LENGTH
 
