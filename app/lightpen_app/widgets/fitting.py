@@ -272,12 +272,6 @@ class PageScroll(QScrollArea):
         super().__init__()
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._revealed: QWidget | None = None  # until its user scrolls
-
-        # Connections
-        bar = self.verticalScrollBar()
-        bar.rangeChanged.connect(self._on_range_changed)
-        bar.actionTriggered.connect(self._forget_revealed)
 
     @override
     def setWidget(self, widget: QWidget) -> None:
@@ -285,32 +279,6 @@ class PageScroll(QScrollArea):
         super().setWidget(widget)
         widget.setAutoFillBackground(False)
         self.viewport().setAutoFillBackground(False)
-
-    def reveal(self, widget: QWidget) -> None:
-        """Scroll to a widget whose text may have grown."""
-        content, around = self.widget(), widget.parentWidget()
-        assert content is not None
-        while around is not None and around is not self:
-            layout = around.layout()
-            if layout is not None:
-                layout.activate()  # as pending events would do later
-            around = around.parentWidget()
-        content.resize(content.width(), content.heightForWidth(content.width()))
-        self._revealed = widget
-        self.ensureWidgetVisible(widget, 0, 0)
-
-    @override
-    def focusNextPrevChild(self, next: bool) -> bool:
-        self._forget_revealed()
-        return super().focusNextPrevChild(next)
-
-    def _on_range_changed(self) -> None:
-        """Keep the revealed widget visible while others change."""
-        if self._revealed is not None:
-            self.ensureWidgetVisible(self._revealed, 0, 0)
-
-    def _forget_revealed(self) -> None:
-        self._revealed = None
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:

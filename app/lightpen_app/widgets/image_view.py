@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -26,7 +26,6 @@ from lightpen_app.widgets.fields import Translated
 MAX_ZOOM = 16.0
 ZOOM_STEP = 1.25
 PAN_STEP = 0.1  # of what is seen
-CLICK_SLACK = 4  # px that a mouse may move while it clicks
 LEAST_RING = 6.0  # px, radius
 # Lines drawn at once. Of more Qt has parts drawn by other threads and waits for them,
 # and all other threads of Python wait, too.
@@ -53,12 +52,7 @@ class ImageView(Translated, QWidget):
     """Shows the newest image whole, or enlarged about a place.
 
     The wheel, or + and -, enlarge; the mouse, or the arrow keys, move; 0 shows all.
-    Instead of moving the image, the mouse may draw circles on it.
     """
-
-    pixel_clicked = Signal(float, float)  # where on the image, px
-    # Its centre x, y and its radius, image px.
-    circle_drawn = Signal(float, float, float)
 
     def __init__(self) -> None:
         super().__init__()
@@ -70,9 +64,7 @@ class ImageView(Translated, QWidget):
         self._message = ""
         self._zoom = 1.0
         self._center = QPointF(0.5, 0.5)  # of the image, as fractions
-        self._pressed: QPointF | None = None
-        self._dragged = QPointF()
-        self._draws_circles = False
+        self._dragged: QPointF | None = None  # where the mouse was
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         policy = QSizePolicy.Policy.Expanding
@@ -131,16 +123,6 @@ class ImageView(Translated, QWidget):
         self._zoom = min(max(zoom, 1.0), MAX_ZOOM)
         self._move(place - self.place_of(pixel.x(), pixel.y()))
 
-    def set_draws_circles(self, draws_circles: bool) -> None:
-        """Let the mouse draw circles, or move the image."""
-        self._draws_circles = draws_circles
-        self._pressed = None
-        if draws_circles:
-            self.setCursor(Qt.CursorShape.CrossCursor)
-        else:
-            self.unsetCursor()
-        self.update()
-
     @override
     def sizeHint(self) -> QSize:
         return QSize(612, 512)
@@ -177,11 +159,6 @@ class ImageView(Translated, QWidget):
             taken = [self._ring_box(marker, scale) for marker in self._markers]
             for marker in labelled:  # over the rings
                 self._draw_label(painter, marker, scale, taken)
-        if self._draws_circles and self._pressed is not None:
-            painter.setPen(QPen(QColor(DARK.accent), 2))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            radius = math.dist(self._pressed.toTuple(), self._dragged.toTuple())
-            painter.drawEllipse(self._pressed, radius, radius)
 
     def _draw_pixels(self, painter: QPainter, corner: QPointF, scale: float) -> None:
         """Draw the image; ``scale`` is px of widget per pixel of it."""
@@ -270,33 +247,17 @@ class ImageView(Translated, QWidget):
 
     @override
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._pressed = self._dragged = event.position()
+        self._dragged = event.position()
 
     @override
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is None:
-            return
-        before, self._dragged = self._dragged, event.position()
-        if self._draws_circles:
-            self.update()
-        else:
-            self._move(self._dragged - before)
+        if self._dragged is not None:
+            self._move(event.position() - self._dragged)
+            self._dragged = event.position()
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        pressed, self._pressed = self._pressed, None
-        if pressed is None or self._size.isEmpty():
-            return
-        pixel = self.pixel_at(pressed)
-        if (event.position() - pressed).manhattanLength() > CLICK_SLACK:
-            if self._draws_circles:
-                rim = self.pixel_at(event.position())
-                radius = math.dist(pixel.toTuple(), rim.toTuple())
-                self.circle_drawn.emit(pixel.x(), pixel.y(), radius)
-                self.update()
-            return
-        if QRectF(-0.5, -0.5, self._size.width(), self._size.height()).contains(pixel):
-            self.pixel_clicked.emit(pixel.x(), pixel.y())
+        self._dragged = None
 
     @override
     def _retranslate(self) -> None:

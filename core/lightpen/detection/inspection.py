@@ -165,40 +165,6 @@ def _hull(circles: FloatArray) -> FloatArray:
     return np.append(center, (offsets + circles[:, 2]).max())
 
 
-def with_circle(mask: FloatArray, circle: FloatArray) -> FloatArray:
-    """Return a mask (M, 3) with a circle x, y, radius more, px."""
-    return np.concatenate([mask, np.reshape(circle, (1, 3))])
-
-
-def clicked(mask: FloatArray, spots: Spots, point: FloatArray) -> FloatArray:
-    """Return a mask after a click on the image.
-
-    A click into circles removes them, one on or beside a spot adds a circle, any other
-    changes nothing.
-
-    Parameters
-    ----------
-    mask : (M, 3) array
-        x, y and radius, px.
-    spots : Spots
-        Bright spots that are not masked.
-    point : (2,) array
-        Position of the click, px.
-    """
-    is_hit = _distances(mask, point) <= mask[:, 2]
-    if is_hit.any():
-        return mask[~is_hit]
-    circles = stray_light(spots)
-    gaps = _distances(circles, point) - circles[:, 2]
-    if not len(gaps) or gaps.min() > 0:
-        return mask
-    return with_circle(mask, circles[np.argmin(gaps)])
-
-
-def _distances(circles: FloatArray, point: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(circles[:, :2] - point, axis=1))
-
-
 # The fastest guided swing, 30 degrees a second, then smears an LED by some 1.5 px.
 LONGEST_EXPOSURE_US = 5000.0
 

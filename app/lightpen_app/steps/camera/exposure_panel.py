@@ -1,5 +1,6 @@
 """Exposure and focus: assessment of the image and advice."""
 
+import math
 from collections import deque
 
 from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, Signal
@@ -16,6 +17,7 @@ from lightpen.detection.inspection import (
     ExposureState,
     Inspection,
     advise,
+    is_sharp,
 )
 from lightpen.detection.spots import SATURATED_LEVEL
 from lightpen.live.pipeline import LiveImage
@@ -24,10 +26,10 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, text_label
 from lightpen_app.look.words import set_tooltip
-from lightpen_app.steps.camera.live_panel import N_TRACED, FocusMeter
 from lightpen_app.steps.camera.settings_panel import SettingField
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.live_view import LiveView
 
 BAR_HEIGHT = 2 * GRID
@@ -359,18 +361,22 @@ def _holds(adjustment: AutoExposure, exposure: Exposure) -> bool:
     return True
 
 
+N_COMPARED = 120  # images: six seconds, of which the sharpest is named
+
+
 class FocusPanel(Translated, QFrame):
     """The sharpness of the LEDs, and what to do."""
 
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("area", "panel")
-        self._widths: deque[float] = deque(maxlen=N_TRACED)
+        self._widths: deque[float] = deque(maxlen=N_COMPARED)
         self._is_saturated = self._is_recorded = False
 
         # Widgets
-        self._meter = self.say(
-            FocusMeter(),
+        self._verdict = SignLabel()
+        self._number = self.say(
+            text_label(TextSize.TITLE),
             tip=self.tr(
                 "Edge width of the LEDs from dark to bright. Hold the pen still."
             ),
@@ -379,22 +385,29 @@ class FocusPanel(Translated, QFrame):
         self._hint.setAlignment(Qt.AlignmentFlag.AlignTop)
 
         # Layout
-        vertical_layout(self, self._meter, (self._hint, 1), margins=PADDING)
+        shown = self._verdict, self._number, (self._hint, 1)
+        vertical_layout(self, *shown, margins=PADDING)
 
         self._retranslate()
+
+    def verdict(self) -> str:
+        """Return whether the LEDs are sharp, in words."""
+        return self._verdict.value().text
+
+    def number(self) -> str:
+        """Return the edge width, and the smallest so far."""
+        return self._number.text()
 
     def add(self, inspection: Inspection) -> None:
         """Show one more image."""
         self._widths.append(inspection.edge_width)
         self._is_saturated = inspection.exposure.n_saturated > 0
-        self._meter.set_value(self._widths, is_saturated=self._is_saturated)
         self._refresh()
 
     def clear(self) -> None:
         """Clear the images of the previous camera."""
         self._widths.clear()
         self._is_saturated = False
-        self._meter.set_value(())
         self._refresh()
 
     def set_recorded(self, is_recorded: bool) -> None:
@@ -403,15 +416,31 @@ class FocusPanel(Translated, QFrame):
         self._refresh()
 
     def _refresh(self) -> None:
-        if self._is_recorded:
-            words = self.tr("Recorded images: focus is fixed.")
+        width = self._widths[-1] if self._widths else math.nan
+        is_seen = math.isfinite(width)
+        words = ""
+        if not is_seen:
+            verdict = StatusMessage(self.tr("No LED detected"), Sign.EYE, Tone.QUIET)
         elif self._is_saturated:
-            words = self.tr(
+            verdict = StatusMessage.warning(self.tr("Saturated"))
+        elif is_sharp(width):
+            verdict = StatusMessage.good(self.tr("In focus"))
+        else:
+            verdict = StatusMessage.warning(self.tr("Out of focus"))
+        if is_seen:
+            best = min(filter(math.isfinite, self._widths))
+            words = self.tr("{0:.1f} px, best {1:.1f} px").format(width, best)
+        self._verdict.set_value(verdict)
+        self._number.setText(words)
+        if self._is_recorded:
+            hint = self.tr("Recorded images: focus is fixed.")
+        elif self._is_saturated:
+            hint = self.tr(
                 "Reduce the exposure first: saturated LEDs give no edge width."
             )
         else:
-            words = self.tr("Turn the focus ring until the edge width is smallest.")
-        self._hint.setText(words)
+            hint = self.tr("Turn the focus ring until the edge width is smallest.")
+        self._hint.setText(hint)
 
     def _retranslate(self) -> None:
         self._refresh()

@@ -5,12 +5,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QGroupBox
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.inspection import (
-    SEARCHED_IMAGES,
-    StraySearch,
-    clicked,
-    with_circle,
-)
+from lightpen.detection.inspection import SEARCHED_IMAGES, StraySearch
 from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
@@ -34,7 +29,6 @@ class StrayLightPanel(Translated, QGroupBox):
     clear_requested = Signal()  # leave nothing out any more
     # The simulated operator is to cover the LEDs, or to uncover them.
     cover_requested = Signal(bool)
-    drawing_toggled = Signal(bool)  # start or end drawing the mask on the image
 
     def __init__(self) -> None:
         super().__init__()
@@ -54,14 +48,6 @@ class StrayLightPanel(Translated, QGroupBox):
         self._start = self.make_button(self.tr("Search"), self._on_start_clicked)
         self._mask = PushButton()
         self._clear = self.make_button(self.tr("Clear mask"), self.clear_requested)
-        self._draw = self.say(
-            PushButton(checkable=True),
-            self.tr("Draw mask on the image"),
-            tip=self.tr(
-                "Click a spot to mask it, drag to draw a circle, or click a circle "
-                "to remove it."
-            ),
-        )
         self._outcome = SignLabel()
 
         # Layout
@@ -71,7 +57,6 @@ class StrayLightPanel(Translated, QGroupBox):
         buttons.addWidget(self._cover, 0, 1)
         buttons.addWidget(self._mask, 1, 0)
         buttons.addWidget(self._clear, 1, 1)
-        buttons.addWidget(self._draw, 2, 0, 1, 2)
         buttons.setColumnStretch(0, 1)
         buttons.setColumnStretch(1, 1)
         layout.addWidget(self._outcome)
@@ -79,7 +64,6 @@ class StrayLightPanel(Translated, QGroupBox):
         # Connections
         self._cover.toggled.connect(self._on_cover_toggled)
         self._mask.clicked.connect(self._on_mask_clicked)
-        self._draw.toggled.connect(self.drawing_toggled)
 
         self._retranslate()
 
@@ -109,15 +93,6 @@ class StrayLightPanel(Translated, QGroupBox):
     def set_has_operator(self, has_operator: bool) -> None:
         """Offer that the simulated operator covers the LEDs, or not."""
         self._cover.setVisible(has_operator)
-
-    @property
-    def is_drawing(self) -> bool:
-        """Whether the mask is drawn on the image now."""
-        return self._draw.isChecked()
-
-    def end_drawing(self) -> None:
-        """End drawing of the mask."""
-        self._draw.setChecked(False)
 
     def uncover(self) -> None:
         """Let the simulated operator uncover the LEDs, if he covers them."""
@@ -225,7 +200,7 @@ class StrayLightPanel(Translated, QGroupBox):
 
 
 class MaskControl(QObject):
-    """Carries out requests of the stray-light panel and of the image."""
+    """Carries out requests of the stray-light panel."""
 
     def __init__(
         self,
@@ -243,9 +218,6 @@ class MaskControl(QObject):
         panel.mask_requested.connect(self._on_mask_requested)
         panel.clear_requested.connect(self._on_clear_requested)
         panel.cover_requested.connect(self._on_cover_requested)
-        panel.drawing_toggled.connect(images.view.set_draws_circles)
-        images.view.pixel_clicked.connect(self._on_image_clicked)
-        images.view.circle_drawn.connect(self._on_circle_drawn)
 
     def show_mask(self) -> None:
         """Show masked circles and the stray light found."""
@@ -255,9 +227,8 @@ class MaskControl(QObject):
         self._images.set_extra_markers((*masked, *found))
 
     def end(self) -> None:
-        """End searching and drawing, as the step is left."""
+        """End searching, as the step is left."""
         self._panel.give_up()
-        self._panel.end_drawing()
         self._panel.uncover()
 
     @property
@@ -274,14 +245,6 @@ class MaskControl(QObject):
 
     def _on_clear_requested(self) -> None:
         self._set_mask(np.zeros((0, 3)))
-
-    def _on_image_clicked(self, x: float, y: float) -> None:
-        spots = self._images.spots()
-        if self._panel.is_drawing and spots is not None:
-            self._set_mask(clicked(self._mask, spots, np.array([x, y])))
-
-    def _on_circle_drawn(self, x: float, y: float, radius: float) -> None:
-        self._set_mask(with_circle(self._mask, np.array([x, y, radius])))
 
     def _on_cover_requested(self, covers: bool) -> None:
         if operator := self._live.operator:

@@ -1,6 +1,6 @@
 """The panels of the step Camera, arranged about the live image."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -76,7 +76,8 @@ class CameraPanels(ResponsiveLayout, QWidget):
 
     def reveal_stray_light(self) -> None:
         """Scroll to the search for stray light."""
-        self._side.reveal(self.stray_light)
+        panel, show = self.stray_light, self._side.ensureWidgetVisible
+        QTimer.singleShot(0, panel, lambda: show(panel, 0, 0))  # once it has grown
 
     @override
     def _use_room(self) -> None:
