@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from lightpen.model.limits import USUAL, DueRule, StationLimits, SwingLimits
+from lightpen.model.limits import USUAL, StationLimits, SwingLimits
 from lightpen.record.library.supervision import Supervision
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import NO_SOURCE, Preparation, SourceChoice
@@ -145,11 +145,6 @@ class Selection(QObject):
         self._remember()
         self.changed.emit(self._preparation)
 
-    def set_due_rule(self, rule: DueRule) -> None:
-        """Store the calibration interval of the station."""
-        self._settings.set_due_rule(rule)
-        self.changed.emit(self._preparation)
-
     def set_supervision(self, supervision: Supervision) -> None:
         """Use the limits set by supervisors from now on."""
         self._supervision = supervision
@@ -159,11 +154,7 @@ class Selection(QObject):
         self._follow(before)
 
     def _limits_for(self, preparation: Preparation) -> StationLimits:
-        chosen = replace(
-            self._settings.machine_limits(),
-            swing=preparation.limits,
-            due=self._settings.due_rule(),
-        )
+        chosen = replace(self._settings.machine_limits(), swing=preparation.limits)
         return self._supervision.limits_at(preparation.names.station, chosen)
 
     def _follow(self, before: Preparation) -> None:

@@ -23,13 +23,7 @@ from lightpen.cameras.sources import source_named
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
-from lightpen.model.limits import (
-    USUAL,
-    Assumptions,
-    DueRule,
-    StationLimits,
-    SwingLimits,
-)
+from lightpen.model.limits import USUAL, Assumptions, StationLimits, SwingLimits
 from lightpen.model.names import Laboratory, Method
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import (
@@ -313,10 +307,6 @@ class Settings(QObject):
         """Remember the laboratory that a certificate names."""
         self._save("last", {"laboratory": asdict(laboratory)})
 
-    def due_rule(self) -> DueRule:
-        """Return the calibration interval."""
-        return read_group(self._content.get("due"), self.machine_limits().due)
-
     def update_file(self) -> str:
         """Return the file that names the newest version; empty for none."""
         return self._machine.update_file
@@ -324,10 +314,6 @@ class Settings(QObject):
     def machine_limits(self) -> StationLimits:
         """Return the limits of this computer, which a station uses at first."""
         return self._machine.station_limits()
-
-    def set_due_rule(self, rule: DueRule) -> None:
-        """Store the calibration interval."""
-        self._save("due", stored_group(rule))
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Restore the geometry of a window; False if never stored."""

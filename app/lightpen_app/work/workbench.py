@@ -173,7 +173,7 @@ class Workbench(QObject):
         self.run = SwingRun(folder, around.now, notices, self)
         self.parts: list[WorkbenchPart] = []  # of extensions, which add them
         self.live = LiveView(self.run, notices, self)
-        rule = settings.due_rule()
+        rule = settings.machine_limits().due
         self.library = LibraryWatch(
             folder, self.run.logbook, rule, around.now, notices, self
         )

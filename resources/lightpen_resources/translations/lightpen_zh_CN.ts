@@ -836,24 +836,8 @@
 <context>
     <name>DuePanel</name>
     <message>
-        <source>Calibration interval (days)</source>
-        <translation>标定周期（天）</translation>
-    </message>
-    <message>
-        <source>Max. swings of the pen</source>
-        <translation>光笔最多摆动次数</translation>
-    </message>
-    <message>
         <source>No limit</source>
         <translation>无限值</translation>
-    </message>
-    <message>
-        <source>Set by a supervisor at Start: All limits...</source>
-        <translation>由主管在“开始”步骤的“所有限值...”中设定</translation>
-    </message>
-    <message>
-        <source>Each swing, with any tip, wears the common tip seat.</source>
-        <translation>无论使用哪个测头，每次摆动都会磨损共用的安装座。</translation>
     </message>
     <message>
         <source>{0} of {1} tips in use at this station are due.</source>
@@ -1176,14 +1160,14 @@
     </message>
 </context>
 <context>
-    <name>FocusMeter</name>
-    <message>
-        <source>Saturated</source>
-        <translation>饱和</translation>
-    </message>
+    <name>FocusPanel</name>
     <message>
         <source>No LED detected</source>
         <translation>未检测到 LED</translation>
+    </message>
+    <message>
+        <source>Saturated</source>
+        <translation>饱和</translation>
     </message>
     <message>
         <source>In focus</source>
@@ -1194,20 +1178,9 @@
         <translation>对焦不准</translation>
     </message>
     <message>
-        <source>{0} px</source>
-        <translation>{0} px</translation>
+        <source>{0:.1f} px, best {1:.1f} px</source>
+        <translation>{0:.1f} px，最佳 {1:.1f} px</translation>
     </message>
-    <message>
-        <source>limit {0}</source>
-        <translation>限值 {0}</translation>
-    </message>
-    <message>
-        <source>Edge width of the LEDs</source>
-        <translation>LED 边缘宽度</translation>
-    </message>
-</context>
-<context>
-    <name>FocusPanel</name>
     <message>
         <source>Recorded images: focus is fixed.</source>
         <translation>录制的图像：对焦固定。</translation>
@@ -2549,7 +2522,7 @@
     </message>
     <message>
         <source>All LEDs fit their table positions, in {0} views.</source>
-        <translation>在 {0} 个视图中，所有 LED 与表中位置相符。</translation>
+        <translation type="unfinished"></translation>
     </message>
 </context>
 <context>
@@ -4239,14 +4212,6 @@ needed</source>
         <translation>清除屏蔽</translation>
     </message>
     <message>
-        <source>Draw mask on the image</source>
-        <translation>在图像上绘制屏蔽区</translation>
-    </message>
-    <message>
-        <source>Click a spot to mask it, drag to draw a circle, or click a circle to remove it.</source>
-        <translation>点击光斑将其屏蔽，拖动可画圆，点击圆可将其删除。</translation>
-    </message>
-    <message>
         <source>Uncover the LEDs</source>
         <translation>取消遮挡</translation>
     </message>
@@ -5463,7 +5428,7 @@ needed</source>
     </message>
     <message>
         <source>LED {led} is not detected at its table position. It is covered, off, or its position is wrong.</source>
-        <translation>在表中位置未检测到 LED {led}。可能被遮住、未点亮，或位置有误。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>LED {led} is not where the LED file has it</source>
@@ -5759,7 +5724,7 @@ needed</source>
     </message>
     <message>
         <source>RMS residual {sigma:.2f} px; usual is {usual:g} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.</source>
-        <translation>残差均方根 {sigma:.2f} px，通常不超过 {usual:g} px。请检查 LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>ROS (YAML)</source>

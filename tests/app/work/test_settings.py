@@ -89,7 +89,7 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
     assert settings.preferences().language == "zh_CN"
     assert settings.station("new").limits.max_uncertainty == 0.02
     assert settings.machine_limits().verification.tip == 0.05
-    assert settings.due_rule().max_days == 14
+    assert settings.machine_limits().due.max_days == 14
     assert settings.laboratory() == Laboratory(name="Works 2", procedure="WI-0815")
 
     own = Laboratory(name="Hall 3", procedure="WI-1")

@@ -82,6 +82,7 @@ class HistoryContent(Translated, QWidget):
         self._reader = HistoryReader(self._logbook, self)
         self._print_report = PrintReportControl(workbench.save_place, self)
         self._trend = Trend()
+        self._rule = DueRule()
         self._followed: EntryFilter | None = None  # whose trend it is
 
         # Widgets: the order of making them is the order of the Tab key
@@ -131,13 +132,11 @@ class HistoryContent(Translated, QWidget):
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
         self._selection.report_requested.connect(self._report_study)
-        self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
 
         workbench.selection.changed.connect(self._on_workbench_changed)
 
         self.table.set_hidden_columns(self._settings.hidden_columns())
-        self._show_rule()
 
     def check_result(self) -> ArchiveCheckResult | None:
         """Return the result of the last archive check."""
@@ -171,7 +170,7 @@ class HistoryContent(Translated, QWidget):
         words = self.tr("1 entry") if n_lines == 1 else self.tr("{0} entries")
         self._notices.show_status(words.format(n_lines))
         # Deferred until the visible parts are shown.
-        self._reader.read_due(self._due.rule(), self._tips.library)
+        self._read_due()
 
     def _on_columns_changed(self) -> None:
         self._settings.set_hidden_columns(self.table.hidden_columns())
@@ -211,19 +210,13 @@ class HistoryContent(Translated, QWidget):
         self._selection.set_limits(self._chosen.limits.verification)
         self._selection.set_value(selected, self._trend)
 
-    def _show_rule(self) -> None:
-        is_guarded = self._chosen.supervision.is_guarded
-        self._due.set_rule(self._chosen.limits.due, is_guarded=is_guarded)
+    def _read_due(self) -> None:
+        self._rule = self._chosen.limits.due
+        self._reader.read_due(self._rule, self._tips.library)
 
     def _on_workbench_changed(self) -> None:
-        before = self._due.rule()
-        self._show_rule()
-        if self._due.rule() != before:
-            self._reader.read_due(self._due.rule(), self._tips.library)
-
-    def _on_rule_changed(self, rule: DueRule) -> None:
-        self._chosen.set_due_rule(rule)
-        self._reader.read_due(rule, self._tips.library)
+        if self._chosen.limits.due != self._rule:
+            self._read_due()
 
     # What is entered
 

@@ -117,27 +117,6 @@ def type_and_state_text(line: Line, kind_of: EventText) -> str:
     return listed(words)
 
 
-def usual_words() -> tuple[str, ...]:
-    """Return the usual remarks on a calibration, by origin of its images."""
-    of_tips = (kind_text(Kind.ACCEPTED), *map(origin_text, MARKED))
-    states = tuple(map(_translated, _STATES.values()))
-    verified = kind_text(Kind.VERIFICATION)
-    return (
-        *(listed([word, state]) for word in of_tips for state in states),
-        *(listed([origin_text(origin), verified]) for origin in MARKED),
-    )
-
-
-def rare_words() -> tuple[str, ...]:
-    """Return the remarks on a swing without a result."""
-    kinds = (
-        kind_text(Kind.REFUSED),
-        kind_text(Kind.REFUSED, Grade.PASS),
-        kind_text(Kind.ABANDONED),
-    )
-    return tuple(listed([origin_text(o), kind]) for o in MARKED for kind in kinds)
-
-
 def item_text(event: Event) -> str:
     """Return the new values of a library item."""
     words = [

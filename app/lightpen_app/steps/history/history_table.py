@@ -1,31 +1,27 @@
 """The entries of the archive as a table, the newest first, read on demand."""
 
 from collections import OrderedDict
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
 from itertools import chain, islice
 from typing import Any
 
-from PySide6.QtCore import QEvent, QItemSelectionModel, Qt, Signal
-from PySide6.QtGui import QAction, QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QWidget
+from PySide6.QtCore import QItemSelectionModel, Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QWidget
 from typing_extensions import override
 
 from lightpen.archive.chains import Kind
 from lightpen.archive.history import EntryFilter, KnownNames, Line
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.look.phrases import grade_text
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, set_size
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, set_size
 from lightpen_app.look.words import mm_text, moment_text, plain_tooltip, shortened
 from lightpen_app.steps.history.entry_panel import (
     EventText,
     kind_text,
     line_tone,
-    rare_words,
     type_and_state_text,
-    usual_words,
     verdict_text,
 )
 from lightpen_app.steps.history.reader import BLOCK
@@ -34,17 +30,9 @@ from lightpen_app.widgets.tables import RIGHT, ROW_HEIGHT, Index, RowTable, Titl
 
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
 NUMBERS = (X, Y, Z, U)
-FIGURES = (WHEN, *NUMBERS)  # never cut
-NAMED = {  # shortest and longest names that are shown whole
-    STATION: ("Hall 12", 12 * "n"),
-    PEN: ("LP-0000", 12 * "n"),
-    TIP: ("T-10-80", 12 * "n"),
-    BY: ("A. Name", 16 * "n"),
-}
-MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
-CELL_MARGIN = 18  # px, beside the words
-LEAST_WORDS = 8 * GRID  # px, of the last column
-LEAST_SHARE = 0.8  # of the width of words that is left where there is no room
+NAMES = (STATION, PEN, TIP, BY)
+LONGEST_NAME = 16  # letters of a name that are shown
+WIDEST = 26 * GRID  # px, of a column
 LEAST_ROWS = 3
 MOST_BLOCKS = 40  # that are kept
 MOST_SELECTED = 1000  # lines that are compared
@@ -114,8 +102,9 @@ class HistoryModel(TitledModel):
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
             line = self.line(index.row())
             text = UNREAD if line is None else _text(line, column, self._kind_of)
-            is_tip = role == Qt.ItemDataRole.ToolTipRole
-            return plain_tooltip(text) if is_tip else text
+            if role == Qt.ItemDataRole.ToolTipRole:
+                return plain_tooltip(text)
+            return shortened(text, LONGEST_NAME) if column in NAMES else text
         if role == Qt.ItemDataRole.ForegroundRole and column in (WHAT, VERDICT):
             line = self.line(index.row())
             tone = Tone.PLAIN if line is None else line_tone(line, column == VERDICT)
@@ -171,11 +160,17 @@ class HistoryTable(Translated, RowTable):
             each.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
             each.addActions(self._shown)
         self.setMinimumHeight((LEAST_ROWS + 2) * ROW_HEIGHT)
+        across = self.horizontalHeader()
+        across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        across.setResizeContentsPrecision(0)  # by the rows that are seen
+        across.setMaximumSectionSize(WIDEST)
+        for each in (self, across):
+            set_size(each, TextSize.SMALL)
 
         # Connections
         for action in self._shown:
             action.setChecked(True)
-            action.toggled.connect(self._share_width)
+            action.toggled.connect(self._show_columns)
             action.triggered.connect(self.columns_changed)
         self._model.block_wanted.connect(
             self.block_wanted, Qt.ConnectionType.QueuedConnection
@@ -211,7 +206,7 @@ class HistoryTable(Translated, RowTable):
     def set_stations(self, stations: Sequence[str]) -> None:
         """Take over which stations the entries are of."""
         self._is_of_one_station = len(stations) <= 1
-        self._share_width()
+        self._show_columns()
 
     def hidden_columns(self) -> tuple[int, ...]:
         """Return the columns that the user does not want to see."""
@@ -248,78 +243,14 @@ class HistoryTable(Translated, RowTable):
             r.top() <= last and first <= r.bottom() for r in ranges
         )
 
-    @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._share_width()
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange):
-            self._share_width()
-
-    def _share_width(self) -> None:
-        """Give each column its minimum, and share the rest up to the maximum.
-
-        Where not even that fits, the letters are smaller, no column shows the station
-        where there is only one, and then words lose their end.
-        """
-        room = self.viewport().width() - LEAST_WORDS
-        body, small = (
-            QFontMetrics(font(TextSize.BODY)),
-            QFontMetrics(font(TextSize.SMALL)),
-        )
-        hidden = set(self.hidden_columns())
-        is_dense = sum(self._widths(body, 0, hidden).values()) > room
-        letters = small if is_dense else body
-        for each in (self, self.horizontalHeader()):
-            set_size(each, TextSize.SMALL if is_dense else TextSize.BODY)
-        if is_dense and self._is_of_one_station:
-            hidden.add(STATION)
-        for column in range(WORDS):
-            self.setColumnHidden(column, column in hidden)
-        least, most = (self._widths(letters, longer, hidden) for longer in (0, 1))
-        words = {c: width for c, width in least.items() if c not in FIGURES}
-        lack = (sum(least.values()) - room) / max(sum(words.values()), 1)
-        if lack > 0:
-            shown = max(1 - lack, LEAST_SHARE)
-            least |= {column: int(shown * width) for column, width in words.items()}
-            most = least
-        wanted = {column: most[column] - least[column] for column in least}
-        spare = room - sum(least.values())
-        share = min(max(spare / max(sum(wanted.values()), 1), 0.0), 1.0)
-        for column, width in least.items():
-            self.setColumnWidth(column, width + int(share * wanted[column]))
-        self.setColumnWidth(WORDS, LEAST_WORDS)  # and all that is left
-
-    def _widths(
-        self, letters: QFontMetrics, longer: int, hidden: Container[int]
-    ) -> dict[int, int]:
-        """Return the width of each column but the last, by short or longer words."""
-        texts = (*usual_words(), *rare_words()) if longer else usual_words()
-        samples = {
-            WHEN: MOMENT,
-            WHAT: max(texts, key=letters.horizontalAdvance),
-            VERDICT: max(map(grade_text, Grade), key=letters.horizontalAdvance),
-            **dict.fromkeys((X, Y, Z), COORDINATE),
-            U: UNCERTAINTY,
-            **{column: names[longer] for column, names in NAMED.items()},
-        }
-        across = Qt.Orientation.Horizontal
-        return {
-            column: CELL_MARGIN
-            + max(
-                letters.horizontalAdvance(each)
-                for each in (words, str(self._model.headerData(column, across)))
-            )
-            for column, words in samples.items()
-            if column not in hidden
-        }
+    def _show_columns(self) -> None:
+        """Hide what the user does not want, and the station where there is only one."""
+        for column, action in enumerate(self._shown):
+            is_alone = column == STATION and self._is_of_one_station
+            self.setColumnHidden(column, is_alone or not action.isChecked())
 
     @override
     def _retranslate(self) -> None:
-        self._share_width()
         for action, title in zip(self._shown, self._model.titles(), strict=False):
             action.setText(title)
         self.show_other_words()
