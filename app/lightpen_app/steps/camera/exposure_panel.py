@@ -376,7 +376,7 @@ class FocusPanel(Translated, QFrame):
         # Widgets
         self._verdict = SignLabel()
         self._number = self.say(
-            text_label(TextSize.TITLE),
+            text_label(TextSize.LEAD),
             tip=self.tr(
                 "Edge width of the LEDs from dark to bright. Hold the pen still."
             ),
