@@ -2522,7 +2522,7 @@
     </message>
     <message>
         <source>All LEDs fit their table positions, in {0} views.</source>
-        <translation type="unfinished"></translation>
+        <translation>全部 LED 与表中位置一致，共 {0} 个视角。</translation>
     </message>
 </context>
 <context>
@@ -5428,7 +5428,7 @@ needed</source>
     </message>
     <message>
         <source>LED {led} is not detected at its table position. It is covered, off, or its position is wrong.</source>
-        <translation type="unfinished"></translation>
+        <translation>在表中位置检测不到 LED {led}。它被遮挡、熄灭，或位置有误。</translation>
     </message>
     <message>
         <source>LED {led} is not where the LED file has it</source>
@@ -5724,7 +5724,7 @@ needed</source>
     </message>
     <message>
         <source>RMS residual {sigma:.2f} px; usual is {usual:g} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.</source>
-        <translation type="unfinished"></translation>
+        <translation>残差 RMS {sigma:.2f} px；通常不超过 {usual:g} px。请检查 LED 文件是否属于此光笔，内参文件是否属于此相机和镜头。</translation>
     </message>
     <message>
         <source>ROS (YAML)</source>
