@@ -40,7 +40,6 @@ def _pivot(options: argparse.Namespace) -> None:
     calibration = calibrate_pivot(
         poses.rotations,
         poses.translations,
-        poses.covariances,
         robust=not options.least_squares,
         places=poses.places,
     )

@@ -168,7 +168,7 @@ def _has_mapping(entries: Entries, name: str) -> bool:
 
 def _is_of_array(value: Tree) -> bool:
     """Return whether a part of a file is a camera of caliscope or anipose."""
-    return isinstance(value, dict) and {"matrix", "size"} <= set(value)
+    return isinstance(value, dict) and "size" in value
 
 
 def _of_images(camera: Camera, entries: Entries) -> Camera:

@@ -140,6 +140,7 @@ def check_window(
 
 BROWN, KANNALA_BRANDT = LensModel.BROWN, LensModel.KANNALA_BRANDT
 _FOCAL = "f"
+_BASE = "ptr_wrapper/data/CameraModelCRT/CameraModelBase"  # of calib.io
 _RADIAL = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty"  # in the order of OpenCV
 
 
@@ -216,13 +217,13 @@ LAYOUTS = (
         "calib.io",
         marks="Calibration",
         part="Calibration/cameras/model",
-        size="ptr_wrapper/data/CameraModelCRT/CameraModelBase/imageSize",
+        size=f"{_BASE}/imageSize|{_BASE}/imageWidth {_BASE}/imageHeight",
         numbers=_each(
-            f"f ar:aspect cx cy {_RADIAL} tauX:tx tauY:ty",
+            f"f ar:aspect cx cy skew {_RADIAL} tauX:tx tauY:ty",
             "ptr_wrapper/data/parameters/{}/val",
         ),
         model="polymorphic_name",
-        brown="libcalibcameramodelopencv",
+        brown="libcalibcameramodelopencv libcalibcameramodelmatlab",
     ),
     FileLayout(
         "Zivid",
@@ -327,6 +328,7 @@ _COLMAP_LINE = (
 _BY_IMAGES = message("camera-file.by-images")
 _OF_PROJECT = message("camera-file.of-project")
 _AS_TEXT = message("camera-file.as-text")
+_OF_PAIR = message("camera-file.of-pair")
 FOREIGN = (
     (
         r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):|\"(area|line)_scan_",
@@ -351,6 +353,11 @@ FOREIGN = (
     (r"\"projection_type\"\s*:", "OpenSfM", _AS_TEXT),
     (r"\"cameraData\"\s*:", "DepthAI (OAK-D)", _AS_TEXT),
     (r"<document[^>]*>\s*<chunk", "Metashape", _OF_PROJECT),
+    (r"<projection>frame.*<fx>", "PhotoScan (before 1.2)", _AS_TEXT),
+    (r"\[ *\d+x\d+ +p\[|Intrinsic of \"", "RealSense (display)", _AS_TEXT),
+    (r"(?m)^\[narrow_stereo", "ROS (ost.txt)", _AS_TEXT),
+    (r"\barray\(\[", "Python (display)", _AS_TEXT),
+    (r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|mtx_l)\b", "a stereo pair", _OF_PAIR),
     (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
     (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),
     (r"\A(\x89HDF|.{512}\x89HDF)", "HDF5 (.mat, .h5)", _AS_TEXT),
@@ -372,7 +379,7 @@ def refuse_foreign(data: bytes, name: str) -> None:
 def colmap_tree(text: str, name: str) -> dict[str, Tree] | None:
     """Return the only camera of a ``cameras.txt`` of COLMAP; None of another file."""
     lines = re.findall(_COLMAP_LINE, text)
-    if not lines or re.search(r"(?m)^\s*[^#\s\d]", text):
+    if not lines:
         return None
     if len(lines) > 1:
         raise FileError("camera-file.several-cameras", name=name, n_cameras=len(lines))
@@ -395,6 +402,8 @@ def foreign_intrinsics(entries: Entries) -> Given | None:
 
     Raises `FileError` for a lens model that is not read, or if a number is missing.
     """
+    if entries.has("calibrations"):  # of PhotonVision, one a resolution
+        entries = _descend(entries, "calibrations")
     for layout in LAYOUTS:
         if all(entries.has(*mark.split("|")) for mark in layout.marks.split()):
             return _given(layout, entries)

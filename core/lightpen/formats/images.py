@@ -219,7 +219,7 @@ class MemoryRoom:
         return largest is not None and (self._n + 1) * largest <= self._budget
 
 
-SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".webp")
+SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".pnm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
 IMAGE_FOLDER = "images"
 IN_FLIGHT = 4  # images per thread that may wait in memory
@@ -356,7 +356,7 @@ def _page(file: Path, page: PagePlace | FileError | None) -> Image:
 
 def _stated_full_scale(files: list[Path]) -> int | None:
     """Return the full scale that the first file states, if it is readable."""
-    if not files or files[0].suffix.lower() != ".pgm":
+    if not files or files[0].suffix.lower() not in (".pgm", ".pnm"):
         return None
     try:
         with opened(files[0], IMAGE_FILE, MAX_FILE_SIZE) as stream:
@@ -405,7 +405,8 @@ def _without_images(folder: Path, where: str) -> FileError:
 
 
 def _image_files_in(folder: Path) -> list[Path]:
-    return [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
+    files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
+    return [file for file in files if not file.name.startswith("._")]  # of macOS
 
 
 def _video(path: Path) -> ImageSource:

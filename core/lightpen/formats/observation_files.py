@@ -4,16 +4,14 @@ LED centres have the columns ``frame,led,x_px,y_px``; those of unknown LEDs have
 ``frame,x_px,y_px``. A frame has a number, or a time of up to 9 decimals. LEDs that were
 not seen may be left out, or have empty cells, NaN, (0, 0) or (-1, -1). Poses have the
 row-major rotation
-``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
-and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
-translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. A column
-``pose`` with the number of each is optional; further columns are not read. Without a
-header the columns stand in this order, with the number first if there is one.
+``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen. A
+column ``pose`` with the number of each is optional; further columns are not read.
+Without a header the columns stand in this order, with the number first if there is one.
 """
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
@@ -34,7 +32,7 @@ from lightpen.formats.pose_files import (
     read_sequence,
     refuse_foreign_poses,
 )
-from lightpen.formats.tables import Table, parse_table, read_table
+from lightpen.formats.tables import NOTHING, Table, parse_table, read_table
 from lightpen.messages import Message, message, printable
 from lightpen.model.rigid import nearest_rotation
 
@@ -42,13 +40,13 @@ OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
 LARGEST_TRANSLATION = 1e6  # mm
-LARGEST_COVARIANCE = 1e12  # rad^2, rad mm or mm^2
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
-SINGULAR = 1e-14  # least over largest variance of a pose, in rad and mm
-SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative
 
-_FRAME = ("frame", "image", "frame_id", "time", "timestamp", "time_s", "t")
+_FRAME = (
+    *("frame", "image", "frame_id", "frame_number", "frame_no", "frame_index"),
+    *("time", "timestamp", "timestamp_ns", "time_s", "t", "image_name", "filename"),
+)
 _LED = ("led", "led_id", "marker", "marker_id", "id")
 _PIXEL = (("x_px", "x", "u_px", "u"), ("y_px", "y", "v_px", "v"))
 _CENTERS = (_FRAME, _LED, *_PIXEL)
@@ -58,7 +56,6 @@ _POSE = (
     *((f"r{i}{j}",) for i in "123" for j in "123"),
     *((f"t{axis}_mm", f"t{axis}") for axis in "xyz"),
 )
-_COVARIANCE = tuple((f"c{i}{j}",) for i in "123456" for j in "123456")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,6 @@ class PoseTable:
 
     rotations: FloatArray  # (N, 3, 3)
     translations: FloatArray  # (N, 3), mm
-    covariances: FloatArray | None  # (N, 6, 6), of w and t, rad and mm
     path: Path
     places: IntArray  # (N,), of the poses among all in the file, from 1
     n_lost: int = 0  # rows without a pose
@@ -101,6 +97,7 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     """
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_CENTERS, message("table.of-centers"))
+    table = _with_leds(table, columns)
     frame_of_row = table.moments(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = _seen_pixels(table, columns[2:])
@@ -120,6 +117,16 @@ def read_centers(path: Path, n_leds: int) -> Centers:
             name=table.name,
         )
     return Centers(frames, grid, path, remark)
+
+
+def _with_leds(table: Table, columns: list[int]) -> Table:
+    """Return a table without the rows of frames in which no LED was seen."""
+    named = [
+        i
+        for i, row in enumerate(table.rows)
+        if any(row[column].casefold() not in NOTHING for column in columns[1:])
+    ]
+    return table.only(named) if named else table
 
 
 def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
@@ -157,8 +164,7 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
     Rotations given in few digits are replaced by the nearest rotations; those that are
     rotations to 1e-6 stay as they are. Rows without a pose are left out. ``tool`` is
     the name of one of several. Raises `FileError`, which names the line, for matrices
-    that are no rotations or covariances, poses given twice, or cells that are not
-    numbers.
+    that are no rotations, poses given twice, or cells that are not numbers.
     """
     if path.name.lower().endswith(SEQUENCE_SUFFIXES):
         given = read_sequence(path, tool)
@@ -184,7 +190,6 @@ def _foreign_poses(given: GivenPoses, path: Path) -> PoseTable:
     return PoseTable(
         nearest_rotation(given.rotations),
         given.translations,
-        None,
         path,
         given.places,
         given.n_lost,
@@ -193,7 +198,7 @@ def _foreign_poses(given: GivenPoses, path: Path) -> PoseTable:
 
 
 def _own_poses(table: Table, path: Path) -> PoseTable:
-    columns, covariance_columns = _pose_columns(table)
+    columns = _pose_columns(table)
     if "pose" in table.header:
         _check_repeated(table, table.numbers([table.header.index("pose")])[:, 0])
     elif not table.header and columns[0] == 1:
@@ -203,11 +208,7 @@ def _own_poses(table: Table, path: Path) -> PoseTable:
     if not is_seen.any():
         raise FileError("poses.all-lost", name=table.name, n_poses=len(is_seen))
     places = np.flatnonzero(is_seen)
-    table = replace(
-        table,
-        rows=[table.rows[i] for i in places],
-        lines=[table.lines[i] for i in places],
-    )
+    table = table.only(places)
     numbers = all_numbers[is_seen]
     translations = numbers[:, 9:]
     far = np.abs(translations).max(axis=1) > LARGEST_TRANSLATION
@@ -215,13 +216,9 @@ def _own_poses(table: Table, path: Path) -> PoseTable:
         raise table.error(
             int(np.argmax(far)), message("poses.far", most=LARGEST_TRANSLATION / 1000)
         )
-    covariances = None
-    if covariance_columns:
-        covariances = table.numbers(covariance_columns).reshape(-1, 6, 6)
-        _check_covariances(table, covariances)
     rotations = _checked_rotations(table, numbers[:, :9].reshape(-1, 3, 3))
     n_lost = int(np.count_nonzero(~is_seen))
-    return PoseTable(rotations, translations, covariances, path, places + 1, n_lost)
+    return PoseTable(rotations, translations, path, places + 1, n_lost)
 
 
 def _check_centers(
@@ -274,20 +271,12 @@ def _check_no_pair_twice(
         )
 
 
-def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
-    """Return the columns of the pose and, if present, of its covariance."""
-    what = message("table.of-poses")
+def _pose_columns(table: Table) -> list[int]:
     if table.header:
-        with_covariance = any(name in table.header for (name,) in _COVARIANCE)
-        return (
-            table.columns(_POSE, what),
-            table.columns(_COVARIANCE, what) if with_covariance else [],
-        )
-    skipped = table.n_columns % 12  # the number of the pose
-    if skipped > 1 or table.n_columns - skipped not in (12, 48):
+        return table.columns(_POSE, message("table.of-poses"))
+    if table.n_columns not in (12, 13):  # with the number of the pose
         raise FileError("poses.no-header", name=table.name, n_columns=table.n_columns)
-    places = list(range(skipped, table.n_columns))
-    return places[:12], places[12:]
+    return list(range(table.n_columns - 12, table.n_columns))
 
 
 def _check_repeated(table: Table, poses: FloatArray) -> None:
@@ -319,27 +308,6 @@ def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
     rotations = matrices.copy()
     rotations[coarse] = nearest_rotation(matrices[coarse])
     return rotations
-
-
-def _check_covariances(table: Table, covariances: FloatArray) -> None:
-    variances = np.diagonal(covariances, axis1=1, axis2=2)
-    large = np.abs(covariances).max(axis=(1, 2)) > LARGEST_COVARIANCE
-    safe = np.where(large[:, None, None], 0.0, covariances)
-    safe_variances = np.diagonal(safe, axis1=1, axis2=2)
-    limits = safe_variances[:, :, None] * safe_variances[:, None, :]
-    asymmetry = (safe - np.swapaxes(safe, 1, 2)) ** 2
-    wrong = (
-        large
-        | np.any(variances < 0, axis=1)
-        | np.any(safe**2 > limits * (1 + SYMMETRY_TOLERANCE), axis=(1, 2))
-        | np.any(asymmetry > limits * SYMMETRY_TOLERANCE**2, axis=(1, 2))
-    )
-    if np.any(wrong):
-        raise table.error(int(np.argmax(wrong)), message("poses.no-covariance"))
-    values = np.linalg.eigvalsh(covariances)
-    singular = values[:, 0] <= SINGULAR * values[:, -1]
-    if np.any(singular):
-        raise table.error(int(np.argmax(singular)), message("poses.certain-direction"))
 
 
 NONE = -1

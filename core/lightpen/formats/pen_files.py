@@ -368,7 +368,9 @@ def _of_document(tree: Tree, units: str | None, name: str) -> PenContent:
     if isinstance(tree, dict):
         entries = Entries.of(tree, name)
         stated = UNIT_NAMES.get(entries.word("units", "unit").casefold(), "")
-    size = UNITS[agreed_unit(stated, units or markers.unit or None, name)]
+    if units is None:
+        stated = stated or markers.unit
+    size = UNITS[agreed_unit(stated, units, name)]
     normals = markers.normals
     if normals is not None:
         normals = np.array(

@@ -203,18 +203,12 @@ def _check_numbering(table: Table, column: int) -> None:
     Names without numbers, or numbers from 0 in names, are in order.
     """
     cells = [row[column] for row in table.rows]
-    if any(number_flaw(cell) for cell in cells):
-        ends = [re.search(r"(?a)\d+$", cell) for cell in cells]
-        if not all(ends) or not all(cells):
-            if all(cells) and len(set(cells)) == len(cells) and not any(ends):
-                return
-            table.whole_numbers(column)  # names the line
-        shown = [end[0] for end in ends if end is not None]
-        least = min(int(shown[0]), 1)
-        places = [str(int(each) - least + 1) for each in shown]
-        rows = [[place] for place in places]
-        table, column = replace(table, rows=rows), 0
+    numbered = [cell for cell in cells if not cell or re.search(r"(?a)\d$", cell)]
+    if not numbered and len(set(cells)) == len(cells):
+        return
     numbers = table.whole_numbers(column)
+    if number_flaw(cells[0]) and numbers[0] == 0:
+        numbers += 1
     wrong = numbers != np.arange(1, len(numbers) + 1)
     if not np.any(wrong):
         return
@@ -276,11 +270,14 @@ LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
 # Where programs list markers, and in what unit if they always use the same.
 LISTS = (
     ("marker_positions", "m"),  # rpg_monocular_pose_estimator
-    ("TrackedObject/ModelPoints", ""),  # Rift
+    ("TrackedObject/ModelPoints", "m"),  # Rift
     ("lighthouse_config/modelPoints", "m"),  # Vive
     *(("ModelPoints", ""), ("modelPoints", "m")),
     *((name, "") for name in ("markers", "MarkerPositions", "points", "leds")),
-    *((f"{body}/markers", "") for body in ("RigidBody", "rigid_body", "asset", "tool")),
+    *(
+        (f"{body}/markers", "")
+        for body in ("RigidBody", "RigidBodies", "asset", "tool")
+    ),
 )
 _PLACES = ("position", "pos", "xyz", "location", "offset", "coordinates")
 _NORMAL_FIELDS = ("normal", "direction", "dir")
@@ -320,7 +317,7 @@ def refuse_foreign_list(data: bytes, name: str) -> None:
 
 
 def workbook_text(data: bytes, name: str) -> str:
-    """Return the first sheet of a workbook that has cells, as lines with tabs."""
+    """Return the first sheet of a workbook with a table, as lines with tabs."""
     try:
         from python_calamine import CalamineError, CalamineWorkbook
     except ImportError as error:
@@ -335,7 +332,7 @@ def workbook_text(data: bytes, name: str) -> str:
         for index in range(len(book.sheet_names)):
             rows = book.get_sheet_by_index(index).to_python(skip_empty_area=True)
             rows = [row for row in rows if any(cell != "" for cell in row)]
-            if rows:
+            if sum(len(row) - row.count("") >= len(_AXES) for row in rows) > 1:
                 return "".join("\t".join(map(_cell, row)) + "\n" for row in rows)
     except (CalamineError, zipfile.BadZipFile, OSError, ValueError) as error:
         raise FileError("pen-file.damaged-workbook", name=name) from error
@@ -350,7 +347,7 @@ def _cell(value: object) -> str:
 
 def markers_of(tree: Tree, name: str) -> Markers | None:
     """Return the points of a document of another program; None if it lists none."""
-    own = list(tree.values()) if isinstance(tree, dict) else tree
+    own = _in_order(tree) if isinstance(tree, dict) else tree
     if isinstance(own, list) and len(own) > 2 and all(map(_is_point, own)):
         return _markers(own, "", name)
     if not isinstance(tree, dict):
@@ -358,15 +355,27 @@ def markers_of(tree: Tree, name: str) -> Markers | None:
     for path, unit in LISTS:
         found: Tree = tree
         for key in path.split("/"):
+            if isinstance(found, list) and len(found) == 1:  # of rigid bodies
+                found = found[0]
             entries = Entries.of(found, name) if isinstance(found, dict) else None
             found = None
             if entries is not None and entries.has(key):
                 found = entries.value(key)
         if isinstance(found, dict):
-            found = list(found.values())
+            found = _in_order(found)
         if isinstance(found, list) and found:
             return _markers(found, unit, name)
     return None
+
+
+def _in_order(points: dict[str, Tree]) -> list[Tree]:
+    """Return points in the order of the numbers that end their names, if all do."""
+    ends = [re.search(r"(?a)\d+$", name) for name in points]
+    numbers = [int(end[0]) for end in ends if end is not None]
+    values = list(points.values())
+    if len(numbers) < len(points):
+        return values
+    return [values[i] for i in np.argsort(numbers, kind="stable")]
 
 
 def _is_point(value: Tree) -> bool:
@@ -383,6 +392,8 @@ def _markers(listed: list[Tree], unit: str, name: str) -> Markers:
         entries = Entries.of(
             point if isinstance(point, dict) else {"position": point}, place
         )
+        if entries.has(*_PLACES) and isinstance(entries.value(*_PLACES), dict):
+            entries = entries.part(*_PLACES)
         if entries.has(*_AXES):
             row = [float(entries.counted(1, axis)[0]) for axis in _AXES]
         else:

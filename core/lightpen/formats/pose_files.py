@@ -8,7 +8,7 @@ by several lines.
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +51,7 @@ _VECTORS = {"rvec", "rotvec", "rodrigues"}
 _EULER = {"roll", "pitch", "yaw"}
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
 _STATE = r".*(state|status|valid|visible|visibility|tracked).*"
+_FLAG = r"valid|visib|tracked"  # 0 says no; as a state, it may say that all is well
 _LOST = (
     r"(?i)(missing|invalid|lost|disabled|occluded|false|not|no\b|bad|fail|error|out"
     r"|untracked|unknown|nan).*"
@@ -103,9 +104,10 @@ def tools_of(table: Table) -> list[ToolColumns]:
     return tools
 
 
-def is_lost(state: str) -> bool:
-    """Return whether the state of a tool says that it was not seen."""
-    return re.fullmatch(_LOST, state.strip()) is not None
+def is_lost(state: str, column: str = "") -> bool:
+    """Return whether the state of a tool, in this column, says that it was not seen."""
+    is_flag = re.search(_FLAG, column) is not None
+    return bool(re.fullmatch(_LOST, state) or (is_flag and state in ("0", "0.0")))
 
 
 def _role(name: str) -> _Role | None:
@@ -295,6 +297,7 @@ MAX_TOOLS = 20
 HEAD = 1000  # bytes, that tell the form of a file
 
 _FOREIGN = (
+    (r"\A\s*\[\[[^,\]]*\]", "numpy (display)"),
     (r"\A\s*[\[{]", "JSON"),
     (r"\A(\x93NUMPY|PK\x03\x04)", "numpy"),
     (r"\A\x89HDF", "HDF5"),
@@ -334,10 +337,9 @@ def is_own(table: Table) -> bool:
     if table.header:
         names = {f"r{i}{j}" for i in "123" for j in "123"}
         return names <= set(table.header) and "tx_mm" in table.header
-    skipped = table.n_columns % 12
-    if skipped > 1 or table.n_columns - skipped not in (12, 48):
+    if table.n_columns not in (12, 13):
         return False
-    values = _all_numbers(table, range(skipped, skipped + 12))
+    values = table.numbers_or_none(range(table.n_columns - 12, table.n_columns))
     if are_rotations(values[:, :9].reshape(-1, 3, 3)):
         return True
     try:
@@ -350,7 +352,7 @@ def is_own(table: Table) -> bool:
 def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
     """Return the poses of a tool in a table of another program."""
     if not table.header:
-        values = _all_numbers(table, range(table.n_columns))
+        values = table.numbers_or_none(range(table.n_columns))
         return _given(*without_names(values, table.name), None, table.name)
     tools = tools_of(table)
     if not tools:
@@ -368,25 +370,14 @@ def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
 
 
 def _of_tool(table: Table, columns: ToolColumns, rows: list[int]) -> GivenPoses:
-    own = Table(
-        table.name,
-        table.header,
-        [table.rows[i] for i in rows],
-        [table.lines[i] for i in rows],
-    )
-    lost = np.zeros(len(rows), dtype=bool)
-    if columns.state is not None:
-        lost = np.array([is_lost(row[columns.state]) for row in own.rows])
-    # What a tool that is not seen has for numbers is of no interest.
-    own = Table(
-        own.name,
-        own.header,
-        [
-            [""] * len(row) if gone else row
-            for row, gone in zip(own.rows, lost, strict=True)
-        ],
-        own.lines,
-    )
+    own = table.only(rows)
+    if (state := columns.state) is not None:
+        # What a tool that is not seen has for numbers is of no interest.
+        seen = [
+            [""] * len(row) if is_lost(row[state], table.header[state]) else row
+            for row in own.rows
+        ]
+        own = replace(own, rows=seen)
     translations = own.numbers_or_none(columns.translation)
     if columns.matrix:
         rotations = own.numbers_or_none(columns.matrix).reshape(-1, 3, 3)
@@ -447,10 +438,6 @@ def _chosen(names: Sequence[str], tool: str | None, file: str) -> str:
             "poses.several-tools", name=file, n_tools=len(names), tools=", ".join(names)
         )
     return (exact or found)[0]
-
-
-def _all_numbers(table: Table, columns: Sequence[int]) -> FloatArray:
-    return table.numbers_or_none(columns)
 
 
 def read_sequence(path: Path, tool: str | None) -> GivenPoses:

@@ -24,12 +24,20 @@ MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of LED numbers
 LARGEST_MOMENT = 2**63 - 1  # of frame numbers: nanoseconds have 19 digits
 DECIMALS = 9  # of times
-NOTHING = frozenset({"", "nan", "na", "n/a", "none", "null", "-", "--", "missing"})
+NOTHING = frozenset(
+    {"", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "-", "--", "missing"}
+)
 
 # No digit can match in two ways, so that mismatches are found without backtracking.
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
+_COMMENT = "#%"  # of MATLAB, too
+_CELL = r"[^\s;,]"  # lines of a spreadsheet may have none
+_IN_BRACKETS = r"\s*[\[(].*[\])]$"  # a unit
+_LED_NAME = r"(?a)^[^\W\d_].*?(?=\d+$)"
+_FRAME_NAME = r"(?a)[^\W\d].*?(\d+)(\.[a-z]+)?"
+_DATE = r"(?a)\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?"
 _BLANK = message("look-alike.blank")
 _LOOK_ALIKES = {
     **{letter: message("look-alike.letter", letter=letter) for letter in "OolISB"},
@@ -80,9 +88,10 @@ class Table:
                 wanted=wanted,
             )
         places = []
+        header = [re.sub(_IN_BRACKETS, "", name) for name in self.header]
         for alternatives in names:
-            found = [i for i, name in enumerate(self.header) if name in alternatives]
-            if not found:
+            best = next(filter(header.__contains__, alternatives), None)
+            if best is None:
                 raise FileError(
                     "table.no-column",
                     name=self.name,
@@ -91,15 +100,7 @@ class Table:
                     wanted=wanted,
                     header=quoted(",".join(self.header)),
                 )
-            if len(found) > 1:
-                raise FileError(
-                    "table.two-columns",
-                    first=found[0] + 1,
-                    second=found[1] + 1,
-                    name=self.name,
-                    column=alternatives[0],
-                )
-            places.append(found[0])
+            places.append(header.index(best))
         return places
 
     def numbers(self, columns: Sequence[int]) -> FloatArray:
@@ -129,7 +130,7 @@ class Table:
 
         Times with decimals are counted in thousandths, or in thousandths of these.
         """
-        cells = [row[column].replace(",", ".") for row in self.rows]
+        cells = [_moment(row[column]) for row in self.rows]
         if any(map(number_flaw, cells)):
             self.numbers([column])  # names the line
         exact = list(map(Decimal, cells))
@@ -146,9 +147,11 @@ class Table:
     def whole_numbers(self, column: int) -> IntArray:
         """Return a column, by its index from 0, of whole numbers (LEDs).
 
-        Raises `FileError`, which names the line, for any other cell.
+        They may end a name, such as ``LED1``. Raises `FileError`, which names the line,
+        for any other cell.
         """
-        values = self.numbers([column])[:, 0]
+        cells = [[re.sub(_LED_NAME, "", row[column])] for row in self.rows]
+        values = replace(self, rows=cells).numbers([0])[:, 0]
         wrong = (values != np.round(values)) | (np.abs(values) > LARGEST_WHOLE)
         if np.any(wrong):
             row = int(np.argmax(wrong))
@@ -156,6 +159,11 @@ class Table:
                 row, message("table.not-whole", cell=quoted(self.rows[row][column]))
             )
         return values.astype(np.int64)
+
+    def only(self, places: Iterable[int]) -> "Table":
+        """Return these rows alone, by their indices from 0."""
+        rows = [(self.rows[i], self.lines[i]) for i in places]
+        return replace(self, rows=[r for r, _ in rows], lines=[n for _, n in rows])
 
     def error(self, row: int, flaw: Message) -> FileError:
         """Return the error that names the line of a row."""
@@ -208,8 +216,10 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     numbers = [number for number, _ in lines]
     _check_cells(lines, separator, name)
     rows = [_cells(line, separator, number, name) for number, line in lines]
-    if all(row[-1] == "" and len(row) > 1 for row in rows):
+    while all(row[-1] == "" and len(row) > 1 for row in rows):
         rows = [row[:-1] for row in rows]
+    if n_titles := _n_titles(rows):
+        rows, numbers = rows[n_titles:], numbers[n_titles:]
     if is_foreign:
         length = max(map(len, rows))
         rows = [row + [""] * (length - len(row)) for row in rows]
@@ -221,7 +231,7 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         number = numbers.pop(0)
         if not is_foreign:
             _check_header(header, number, name)
-    elif is_foreign:
+    elif is_foreign or separator is not None:
         header = _header_in_comment(text, separator, len(rows[0]))
     if not rows:
         raise FileError("table.only-header", name=name)
@@ -231,15 +241,32 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     return table
 
 
+def _n_titles(rows: list[list[str]]) -> int:
+    """Return the number of lines above the names, which have few of the cells."""
+    filled = [len(row) - row.count("") for row in rows]
+    usual = sorted(filled)[len(filled) // 2]
+    n_titles = next(i for i, count in enumerate(filled) if 2 * count > usual)
+    return 0 if any(map(_looks_numeric, rows[n_titles])) else n_titles
+
+
+def _moment(cell: str) -> str:
+    """Return the number of a frame, also of ``frame_017.png`` or a date."""
+    if named := re.fullmatch(_FRAME_NAME, cell):
+        return named[1]
+    if re.fullmatch(_DATE, cell):
+        return str(np.datetime64(cell.rstrip("Z"), "ns").astype(np.int64))
+    return cell.replace(",", ".")
+
+
 def _header_in_comment(
     text: str, separator: str | None, length: int
 ) -> tuple[str, ...]:
     """Return the names of the last comment before the data, if it has as many."""
     header: tuple[str, ...] = ()
     for line in text.split("\n"):
-        if line.strip() and line.lstrip()[0] != "#":
+        if line.strip() and line.lstrip()[0] not in _COMMENT:
             break
-        cells = [c.strip() for c in line.strip().lstrip("# ").split(separator)]
+        cells = [c.strip() for c in line.strip().lstrip("#% ").split(separator)]
         header = tuple(cell.casefold() for cell in cells) if line.strip() else header
     return header if len(header) == length else ()
 
@@ -286,7 +313,7 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     lines = [
         (number, line)
         for number, line in enumerate(text.split("\n"), 1)
-        if line and not line.isspace() and line.lstrip()[0] != "#"
+        if re.search(_CELL, line) and line.lstrip()[0] not in _COMMENT
     ]
     if not lines:
         raise FileError("table.only-comments", name=name)

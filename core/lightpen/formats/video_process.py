@@ -60,7 +60,6 @@ def count_frames_in_process(path: Path) -> tuple[int, int]:
             MAX_VIDEO_PIXELS,
         )
         codec = _codec(stream)
-        degrees = int(stream.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         if stream.isOpened() and codec == UNCOMPRESSED:
             raise FileError("video.uncompressed", path=path)
         if stream.isOpened() and codec not in CODECS:
@@ -72,6 +71,9 @@ def count_frames_in_process(path: Path) -> tuple[int, int]:
                 _check_jpeg(stream.retrieve()[1].tobytes(), _name(n_frames))
     finally:
         stream.release()
+    decoding = _opened_video(path)  # OpenCV 4.14 has no orientation of frames as stored
+    degrees = int(decoding.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+    decoding.release()
     if n_frames == 0 and not _has_ffmpeg():
         raise FileError("video.motion-jpeg-only", path=path)
     if n_frames == 0:

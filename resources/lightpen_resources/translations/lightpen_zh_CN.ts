@@ -6119,6 +6119,10 @@ needed</source>
         <translation>请将图像尺寸、相机矩阵和畸变系数写成文本：MATLAB 用 jsonencode，Python 用 cv2.FileStorage。</translation>
     </message>
     <message>
+        <source>Write the matrix and the distortion of the camera that observes the pen as camera_matrix and distortion_coefficients, with image_width and image_height.</source>
+        <translation>请将观测光笔的那台相机的矩阵和畸变写成 camera_matrix 和 distortion_coefficients，并写明 image_width 和 image_height。</translation>
+    </message>
+    <message>
         <source>Your disk quota is used up. Free some space, or write elsewhere.</source>
         <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
     </message>
@@ -6261,10 +6265,6 @@ needed</source>
     <message>
         <source>the LED file is a mirror image of the pen (sign of z)</source>
         <translation>LED 文件为光笔的镜像（z 的符号）</translation>
-    </message>
-    <message>
-        <source>the covariance c11 to c66 has a direction without uncertainty, which is implausible. Correct or remove these columns.</source>
-        <translation>协方差 c11 至 c66 有一个方向没有不确定度，这不合理。请更正或删除这些列。</translation>
     </message>
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
@@ -6737,10 +6737,6 @@ needed</source>
     <message>
         <source>blurred</source>
         <translation>图像模糊</translation>
-    </message>
-    <message>
-        <source>c11 to c66 are not a covariance: they must be symmetric, with correlations from -1 to 1. Correct or remove these columns.</source>
-        <translation>c11 至 c66 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除这些列。</translation>
     </message>
     <message>
         <source>intrinsics file</source>
@@ -7253,10 +7249,6 @@ needed</source>
     <message>
         <source>Characteristics: lengths / mm, angles / degrees</source>
         <translation>特性：长度 / mm，角度 / 度</translation>
-    </message>
-    <message>
-        <source>Columns {first} and {second} of {name} both contain {column}. Remove one of them.</source>
-        <translation>{name} 的第 {first} 列和第 {second} 列都是 {column}。请删除其中一列。</translation>
     </message>
     <message>
         <source>Computing the tip. Keep the pen at hand.</source>

@@ -103,6 +103,7 @@ def calib_io(**changes: float) -> dict[str, Any]:
     return {"Calibration": {"cereal_class_version": 0, "cameras": [camera]}}
 
 
+CALIB_IO_SIZE = '"imageHeight": 720, "imageWidth": 1280'
 FLAT = [each for row in MATRIX for each in row]
 PHOTONVISION: dict[str, Any] = {
     "resolution": {"width": 1280.0, "height": 720.0},
@@ -206,14 +207,22 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(MRCAL.split("\n", 1)[1], id="mrcal without comment"),
         pytest.param(MRCAL.replace("0., 0., 0., 0.,]", "]"), id="mrcal OPENCV4"),
         pytest.param(COLMAP, id="COLMAP"),
+        pytest.param(COLMAP.replace("# ", ""), id="COLMAP without marks of comments"),
         pytest.param(METASHAPE, id="Metashape"),
         pytest.param(calib_io(), id="calib.io"),
+        pytest.param(
+            json.dumps(calib_io(skew=0))
+            .replace('"imageSize": {"width": 1280, "height": 720}', CALIB_IO_SIZE)
+            .replace("ModelOpenCV", "ModelMatlab"),
+            id="calib.io before version 2",
+        ),
         pytest.param(PHOTONVISION, id="PhotonVision"),
         pytest.param(
             without(PHOTONVISION, "distCoeffs")
             | {"cameraExtrinsics": PHOTONVISION["distCoeffs"]},
             id="PhotonVision before 2024",
         ),
+        pytest.param({"FOV": 70, "calibrations": [PHOTONVISION]}, id="its settings"),
         pytest.param(REALSENSE, id="RealSense"),
         pytest.param(CAMODOCAL, id="camodocal"),
         pytest.param(NERFSTUDIO, id="Nerfstudio"),
@@ -351,6 +360,12 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("Pix4D camera calibration file 0\n#Focal\nF 16.0\n", "Pix4D"),
         ("[LEFT_CAM_2K]\nfx=1400\nfy=1400\n", "ZED"),
         ("<document version='1.2.0'>\n<chunk label='a'></chunk></document>", "project"),
+        (METASHAPE.replace("f>", "fx>"), "PhotoScan"),
+        ("[ 640x480  p[318 241]  f[615 615]  Brown Conrady [0 0 0 0 0] ]", "RealSense"),
+        ("# oST version 5.0\n[image]\nwidth\n640\n\n[narrow_stereo]\n", "ost.txt"),
+        ("{'mtx': array([[615., 0., 318.], [0., 615., 241.]])}", "Python (display)"),
+        (f"%YAML:1.0\n---\nM1: {MATRIX}\nM2: {MATRIX}\n", "a stereo pair"),
+        ("[cam_0]\nsize = [640, 480]\nrotation_count = 0\n", "no camera_matrix"),
         (CAMODOCAL.replace("PINHOLE", "MEI"), '"MEI"'),
         (f"image_width: 9\nimage_height: 9\nxi: 1.2\nK: {MATRIX}\n", "omnidirect"),
         (MRCAL.replace("OPENCV8", "SPLINED_STEREOGRAPHIC_order=3"), "SPLINED"),

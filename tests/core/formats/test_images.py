@@ -42,6 +42,7 @@ def folder(tmp_path: Path) -> Path:
     for name in ("frame_10.png", "frame_2.png", "frame_1.png"):
         (folder / name).write_bytes(png(GREY))
     (folder / "notes.txt").write_text("no image")
+    (folder / "._frame_1.png").write_bytes(b"\0\5\x16\7")  # as macOS leaves behind
     return folder
 
 

@@ -75,6 +75,7 @@ NAMED: list[list[str | float]] = [
         [["Name", "X", "Y", "Z"], ["", "mm", "mm", "mm"]],
         [["LED", "x_mm", "y_mm", "z_mm"]],
         [["Marker", "X [mm]", "Y [mm]", "Z [mm]"]],
+        [["Pen 7"], ["Measured", "2024"], ["LED", "X [mm]", "Y [mm]", "Z [mm]"]],
     ],
 )
 def test_a_workbook_is_read(tmp_path: Path, head: list[list[str | float]]) -> None:
@@ -164,6 +165,7 @@ def test_nominal_coordinates_alone_are_taken(tmp_path: Path) -> None:
     ("names", "fault"),
     [
         ([f"P{i}" for i in range(10)], ""),
+        ([f"Pen:Marker {i}" for i in range(1, 11)], ""),
         (list("ABCDEFGHIJ"), ""),
         ([f"LED{i}" for i in (1, 3, 2, 4, 5, 6, 7, 8, 9, 10)], "LED 3 is listed"),
         (["LED1", *[f"LED{i}" for i in range(1, 10)]], "listed already"),
@@ -194,13 +196,14 @@ MAPPINGS = [dict(zip("xyz", point, strict=True)) for point in POINTS]
         {"units": "mm", "markers": POINTS},
         {"unit": "mm", "Markers": MAPPINGS},
         {"units": "mm", "RigidBody": {"Markers": MAPPINGS}},
+        {"Units": "mm", "RigidBodies": [{"Markers": [{"Pos": m} for m in MAPPINGS]}]},
         {
             "units": "mm",
             "TrackedObject": {
                 "FlsFormatVersion": "1.0.10",
                 "ModelPoints": {
                     f"Point{i}": [*point, 0, 0, 1, 0, 0, 0]
-                    for i, point in enumerate(POINTS)
+                    for i, point in reversed([*enumerate(POINTS)])
                 },
             },
         },

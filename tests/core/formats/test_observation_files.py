@@ -16,7 +16,6 @@ from lightpen.model.rigid import rotation_from_vector
 
 HEADER = "frame,led,x_px,y_px"
 POSE_HEADER = "pose,r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm"
-COVARIANCE_HEADER = ",".join(f"c{i}{j}" for i in range(1, 7) for j in range(1, 7))
 
 
 def saved(folder: Path, *lines: str) -> Path:
@@ -59,8 +58,21 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         ("7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
         ("y;led;x;frame", "2,5;1;1,5;7", "4;1;3;2", "6;3;5;7"),
         (HEADER + ",sigma", "7,1,1.5,2.5,a", "2,1,3,4,b", "7,3,5,6,c"),
+        (HEADER + ",,", "7,1,1.5,2.5,,", "2,1,3,4,,", "7,3,5,6,,", ",,,,,"),
+        (
+            "% MATLAB",
+            "time,frame,led,x [px],y [px]",
+            "0,7,1,1.5,2.5",
+            "0,2,1,3,4",
+            "0,7,3,5,6",
+        ),
+        (HEADER, "a_07.png,LED1,1.5,2.5", "a_02.png,LED1,3,4", "a_07.png,LED3,5,6"),
+        (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
     ],
-    ids=["header", "no header", "other order", "more columns"],
+    ids=[
+        *("header", "no header", "other order", "more columns"),
+        *("of a spreadsheet", "of MATLAB", "names", "a frame without LEDs"),
+    ],
 )
 def test_centres_are_sorted_by_frame_and_led(
     tmp_path: Path, lines: tuple[str, ...]
@@ -75,7 +87,9 @@ def test_centres_are_sorted_by_frame_and_led(
     assert found.path == path
 
 
-@pytest.mark.parametrize("unseen", ["-1,-1", "0,0", ",", "nan,nan", "NaN,"])
+@pytest.mark.parametrize(
+    "unseen", ["-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A"]
+)
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
     tmp_path: Path, unseen: str
 ) -> None:
@@ -91,6 +105,10 @@ def test_times_are_frames(tmp_path: Path) -> None:
     nanoseconds = ("1764380000123456789", "1764380000123456790")
     rows = [f"{each},1,2,3" for each in nanoseconds]
     assert len(read_centers(saved(tmp_path, HEADER, *rows), 3).frames) == 2
+
+    rows = [f"2024-03-01T12:00:0{each},1,2,3" for each in ("0.25Z", "1.5Z")]
+    frames = read_centers(saved(tmp_path, HEADER, *rows), 3).frames
+    assert frames[1] - frames[0] == 1_250_000_000
 
     rows = [f"{each},1,2,3" for each in ("0.05", "0.10", "0.1")]
     with pytest.raises(FileError, match="LED 1 of frame"):
@@ -186,21 +204,6 @@ def test_poses_are_read(tmp_path: Path, with_number: bool, with_header: bool) ->
     found = read_poses(saved(tmp_path, *lines))
     np.testing.assert_array_equal(found.rotations, rotations(4))
     np.testing.assert_array_equal(found.translations, [[1.5, -2, 900]] * 4)
-    assert found.covariances is None
-
-
-@pytest.mark.parametrize("with_header", [True, False])
-def test_covariances_of_poses_are_read(tmp_path: Path, with_header: bool) -> None:
-    roots = np.random.default_rng(2).normal(size=(4, 6, 6))
-    roots *= [1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1]
-    covariances = np.swapaxes(roots, 1, 2) @ roots
-    covariances = (covariances + np.swapaxes(covariances, 1, 2)) / 2
-    rows = zip(pose_lines(4), covariances, strict=True)
-    lines = [f"{pose},{cells(covariance)}" for pose, covariance in rows]
-    if with_header:
-        lines.insert(0, f"{POSE_HEADER},{COVARIANCE_HEADER}")
-    found = read_poses(saved(tmp_path, *lines))
-    np.testing.assert_array_equal(found.covariances, covariances)
 
 
 def test_rotations_in_few_digits_are_made_rotations(tmp_path: Path) -> None:
@@ -249,34 +252,6 @@ def test_a_pose_given_twice_is_named_with_both_lines(tmp_path: Path) -> None:
 def test_a_translation_of_kilometres_is_refused(tmp_path: Path) -> None:
     text = refusal_of_poses(tmp_path, cells(np.eye(3), np.array([0, 0, 1e300])))
     assert "Line 1 of obs.csv: the translation is more than 1000 m" in text
-
-
-@pytest.mark.parametrize(
-    "covariance",
-    [
-        -np.eye(6),
-        np.eye(6) + np.eye(6)[::-1] * 1.1,
-        np.eye(6) + np.triu(np.full((6, 6), 0.01), 1),
-        np.full((6, 6), 1e300),
-    ],
-)
-def test_what_is_no_covariance_is_refused(
-    tmp_path: Path, covariance: FloatArray
-) -> None:
-    first, second = pose_lines(2)
-    text = refusal_of_poses(
-        tmp_path,
-        f"{POSE_HEADER},{COVARIANCE_HEADER}",
-        f"{first},{cells(np.eye(6))}",
-        f"{second},{cells(covariance)}",
-    )
-    assert text.startswith("Line 3 of obs.csv: c11 to c66 are not a covariance")
-
-
-def test_a_covariance_that_is_not_whole_is_refused(tmp_path: Path) -> None:
-    header = f"{POSE_HEADER},{COVARIANCE_HEADER}".removesuffix(",c66")
-    row = f"{pose_lines(1)[0]},{cells(np.eye(6))}".removesuffix(",1.0")
-    assert "has no column c66" in refusal_of_poses(tmp_path, header, row)
 
 
 def test_a_wrong_number_of_pose_columns_is_refused(tmp_path: Path) -> None:

@@ -198,7 +198,7 @@ def test_normals_in_few_digits_get_unit_length(tmp_path: Path) -> None:
         (",60.1", "", "Line 3 of leds.csv has 3 cells where line 1 has 4"),
         ("x_mm", "w_mm", "leds.csv has no column x"),
         ("y_mm", "x_mm", 'duplicate column "x_mm" in the header.'),
-        ("y_mm", "x [mm]", "Columns 2 and 3 of leds.csv both contain x"),
+        ("y_mm", "x [mm]", "leds.csv has no column y"),
     ],
 )
 def test_a_flaw_of_a_table_is_named(

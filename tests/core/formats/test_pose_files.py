@@ -99,10 +99,19 @@ def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> No
     assert (found.places.tolist(), found.n_lost) == ((kept + 1).tolist(), 1)
 
 
+def test_a_pose_that_a_flag_calls_invalid_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    rows = [f"{i % 3},1,0,0,0,{i + 1},2,900" for i in range(6)]
+    path.write_text("\n".join(["visible,qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
+
+    assert read_poses(path).places.tolist() == [2, 3, 5, 6]
+
+
 @pytest.mark.parametrize(
     ("data", "named"),
     [
         (b'[{"position": [1, 2, 3], "rotation": [0, 0, 0, 1]}]', "JSON"),
+        (b"[[ 1.  0.]\n [ 0.  1.]]\n", "numpy"),
         (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "numpy"),
         (b"0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "Open3D"),
         (b"NO_OF_FRAMES\t80\nNO_OF_BODIES\t1\n", "Qualisys"),

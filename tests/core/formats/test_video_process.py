@@ -1,6 +1,7 @@
 """Videos are decoded in a process of their own, with a limit to its memory."""
 
 import os
+import struct
 import subprocess
 import sys
 from contextlib import suppress
@@ -128,3 +129,16 @@ def test_what_a_decoder_says_of_a_damaged_video_is_not_on_the_console(
         count_frames(path)
 
     assert capfd.readouterr().err == ""
+
+
+def test_the_turn_that_a_header_asks_for_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / "turned.mp4"
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 20, (64, 48))
+    video.write(np.zeros((48, 64, 3), np.uint8))
+    video.release()
+    data = path.read_bytes()
+    matrix = data.index(b"tkhd") + 44
+    turned = struct.pack(">9i", 0, 65536, 0, -65536, 0, 0, 0, 0, 2**30)
+    path.write_bytes(data[:matrix] + turned + data[matrix + 36 :])
+
+    assert count_frames(path) == (1, 90)
