@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from lightpen.cameras.sources import SOURCES
 from lightpen.cli import main as run
 from lightpen.commands.desktop import Desktop
 from lightpen.extension import Extension
@@ -13,10 +14,12 @@ from lightpen_app_extensions.exports import EXPORTS
 from lightpen_app_extensions.measure import MEASURE
 from lightpen_app_extensions.plant import PLANT
 from lightpen_app_extensions.stream import STREAM
+from lightpen_extensions.drivers.extension import DRIVERS
 from lightpen_extensions.simulator.extension import SIMULATOR
 
 PARTS: tuple[Extension | Faced, ...] = (  # each after what it needs
     SIMULATOR,
+    DRIVERS,
     MEASURE,
     BOARDS,
     DISCOVER,
@@ -25,6 +28,7 @@ PARTS: tuple[Extension | Faced, ...] = (  # each after what it needs
     STREAM,
 )
 EXTENSIONS = tuple(e.extension if isinstance(e, Faced) else e for e in PARTS)
+SOURCES.extend(source for each in EXTENSIONS for source in each.sources)
 
 
 def faces() -> tuple[Face, ...]:

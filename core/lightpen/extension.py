@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from lightpen.archive.logbook import Replicate
+    from lightpen.cameras.source import Source
     from lightpen.live.sources import Simulator
 
 SubParsers: TypeAlias = "_SubParsersAction[ArgumentParser]"
@@ -28,6 +29,7 @@ class Extension:
 
     key: str
     commands: tuple[Subcommand, ...] = ()
+    sources: "tuple[Source, ...]" = ()  # of images
     # Adds actions to ``lightpen archive``, and options to its action ``check``.
     add_archive_actions: Callable[[SubParsers, ArgumentParser], None] | None = None
     replicate: "Replicate | None" = None  # delivers entries to a server

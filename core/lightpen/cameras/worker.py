@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-from lightpen.cameras.device_camera import LinkWatch
+from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import (
     CameraCapabilities,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lightpen.cameras.device_camera import WATCHED, LinkWatch
+from lightpen.cameras.link_watch import WATCHED, LinkWatch
 from lightpen.cameras.protocol import CameraFailure, CameraSettings, Stats, TriggerMode
 
 AT_20 = CameraSettings(frame_rate=20.0, trigger=TriggerMode.FREE)

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import IntArray
-from lightpen.cameras.features import PixelFormat, decoded, pixel_format_named, usable
+from lightpen.cameras.pixel_formats import (
+    PixelFormat,
+    decoded,
+    pixel_format_named,
+    usable,
+)
 
 RNG = np.random.default_rng(3)
 WIDTH, HEIGHT = 7, 5  # neither fills a group of packed pixels

@@ -16,8 +16,6 @@ from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
 from typing_extensions import override
 
 from lightpen.arrays import Image
-from lightpen.cameras.aravis import AravisDevice
-from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
@@ -38,6 +36,8 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen_extensions.drivers.aravis import AravisDevice
+from lightpen_extensions.drivers.device_camera import DeviceCamera
 from lightpen_extensions.simulator.scenes import Scene, beside
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 
-from lightpen.cameras.features import pixel_format_named
+from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,

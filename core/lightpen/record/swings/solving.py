@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image, IntArray
-from lightpen.cameras.features import pixel_format_named
+from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.detection.observations import Observations, leave_out, observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_images

@@ -18,8 +18,6 @@ import pytest
 from tests.gige_simulator import ADDRESS, GigeSimulator
 
 from lightpen.arrays import Image
-from lightpen.cameras.aravis import AravisDevice
-from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.protocol import (
     CameraSettings,
     Connection,
@@ -34,6 +32,8 @@ from lightpen.cameras.protocol import (
     WorkerEvent,
 )
 from lightpen.cameras.worker import CameraWorker
+from lightpen_extensions.drivers.aravis import AravisDevice
+from lightpen_extensions.drivers.device_camera import DeviceCamera
 
 TIMEOUT = 60.0  # s until a test gives up
 RNG = np.random.default_rng(5)
@@ -247,7 +247,7 @@ class Server:
     """A simulated camera in a process of its own, to which something befalls."""
 
     def __init__(self) -> None:
-        program = Path(__file__).parents[2] / "gige_simulator.py"
+        program = Path(__file__).parents[3] / "gige_simulator.py"
         self._words = [sys.executable, str(program), "LP02", ADDRESS]
         self.begin()
 

@@ -6,17 +6,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from lightpen.cameras.device_camera import (
+from lightpen.cameras.pairing import Clock
+from lightpen.cameras.protocol import Range
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import message
+from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
     lost,
     not_found,
     setting_refused,
 )
-from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import Range
-from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
-from lightpen.messages import message
 
 LISTED = Path("/sys/class/video4linux")
 N_TRIED = 4  # where the system lists no cameras

@@ -8,26 +8,14 @@ images, their counts, and grey values at full depth.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Protocol
 
-from lightpen.cameras.features import (
-    EXPOSURES,
-    GAINS,
-    Bytes,
-    Features,
-    apply_settings,
-    decoded,
-    pixel_format_named,
-    read_capabilities,
-    read_settings,
-    set_nearest,
-)
 from lightpen.cameras.pairing import Clock, MachineClock
+from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,
     CameraCapabilities,
-    CameraFailure,
     CameraSettings,
     ConfigError,
     DeviceBusy,
@@ -41,6 +29,15 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.messages import Message
+from lightpen_extensions.drivers.features import (
+    EXPOSURES,
+    GAINS,
+    Features,
+    apply_settings,
+    read_capabilities,
+    read_settings,
+    set_nearest,
+)
 
 SETTLING = 0.4  # s in which images with the previous exposure may arrive
 LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again
@@ -328,55 +325,3 @@ def in_sentences(
         raise setting_refused(serial, str(error)) from error
     except losses as error:
         raise lost(serial, str(error)) from error
-
-
-WATCHED = 3.0  # s, after which one window ends and the next begins
-LOST_SHARE = 0.05  # of the images; the odd one costs nothing
-LEAST_LOST = 3
-SLOW_SHARE = 0.8  # of the rate that is set
-
-
-@dataclass(frozen=True)
-class LinkWatch:
-    """Frame counters of a time window."""
-
-    since: Stats | None = None  # counts at the beginning of the window
-    began: float = 0.0  # s
-    is_reported: bool = False  # one fault for each set of settings
-
-    def after(
-        self, stats: Stats, now: float, settings: CameraSettings
-    ) -> tuple[Self, CameraFailure | None]:
-        """Return the state after an image, and a fault of the link or None.
-
-        ``now`` is the arrival time of the image, s.
-        """
-        if self.since is None:
-            return replace(self, since=stats, began=now), None
-        seconds = now - self.began
-        if self.is_reported or seconds < WATCHED:
-            return self, None
-        fault = _fault(stats.since(self.since), seconds, settings)
-        is_reported = fault is not None
-        return replace(self, since=stats, began=now, is_reported=is_reported), fault
-
-
-def _fault(
-    came: Stats, seconds: float, settings: CameraSettings
-) -> CameraFailure | None:
-    n_lost = came.incomplete + came.missed
-    n_sent = came.delivered + n_lost
-    if n_lost >= max(LEAST_LOST, LOST_SHARE * n_sent):
-        return FrameIncomplete(
-            "camera.link-loses",
-            n_sent=n_sent,
-            n_incomplete=came.incomplete,
-            n_missed=came.missed,
-        )
-    rate = settings.frame_rate
-    is_free = settings.trigger is not TriggerMode.SOFTWARE
-    if rate is not None and is_free and n_sent < SLOW_SHARE * rate * seconds:
-        return ConfigError(
-            "camera.rate-not-reached", sent=n_sent / seconds, wanted=rate
-        )
-    return None

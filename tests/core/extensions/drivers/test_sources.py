@@ -7,10 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from lightpen.cameras import aravis as aravis_library
-from lightpen.cameras import basler, genicam
-from lightpen.cameras.basler import BaslerDevice
-from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
@@ -20,6 +16,10 @@ from lightpen.cameras.protocol import (
 )
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, absent_sources, source_named
+from lightpen_extensions.drivers import aravis as aravis_library
+from lightpen_extensions.drivers import basler, genicam
+from lightpen_extensions.drivers.basler import BaslerDevice
+from lightpen_extensions.drivers.device_camera import DeviceCamera
 
 TIMEOUT = 60.0  # s
 MANY = 50  # images, one of which fails

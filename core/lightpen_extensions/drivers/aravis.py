@@ -24,7 +24,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lightpen.cameras.device_camera import (
+from lightpen.cameras.pairing import Clock
+from lightpen.cameras.protocol import DeviceNotFound, Range
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import Message, message
+from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
     busy,
@@ -32,10 +36,6 @@ from lightpen.cameras.device_camera import (
     not_found,
     setting_refused,
 )
-from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import DeviceNotFound, Range
-from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
-from lightpen.messages import Message, message
 
 # Bindings of Aravis by ctypes, with errors as exceptions.
 #

@@ -3,11 +3,11 @@
 import pytest
 from typing_extensions import override
 
-from lightpen.cameras.basler import BASLER
-from lightpen.cameras.genicam import GenapiFeatures
 from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
 from lightpen.cameras.source import SourcePlace
+from lightpen_extensions.drivers.basler import BASLER
+from lightpen_extensions.drivers.genicam import GenapiFeatures
 
 TRIGGERED = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
 

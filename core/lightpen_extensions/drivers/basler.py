@@ -9,7 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.cameras.device_camera import (
+from lightpen.cameras.pairing import Clock
+from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import Message, message
+from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
     busy,
@@ -17,11 +21,7 @@ from lightpen.cameras.device_camera import (
     lost,
     not_found,
 )
-from lightpen.cameras.genicam import GenapiFeatures, refusals
-from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import DeviceNotFound
-from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
-from lightpen.messages import Message, message
+from lightpen_extensions.drivers.genicam import GenapiFeatures, refusals
 
 NAME = "Basler (pylon)"
 # Kinds of connection, those first that are searched without asking the network.

@@ -1,0 +1,1 @@
+"""Cameras of makers and standards, by their libraries."""
