@@ -3,21 +3,17 @@
 import numpy as np
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.record.recomputing import ReestimatedPoses
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.look.words import AXES, MICROMETRES
 from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plots import Curve, TracePlot
 from lightpen_app.widgets.result_plots import (
-    FARTHEST,
     ArrowPlot,
     BarPlot,
     BudgetPlot,
-    Histogram,
-    LinePlot,
+    MarkPlot,
     PosturePlot,
 )
 
@@ -37,20 +33,15 @@ def charts_of(
     plots = {
         "budget_plot": _budget(calibration),
         "misfits": _misfits(calibration),
-        "tips": _tips(calibration),
         "led_plot": _leds(calibration),
     }
-    coverage = _coverage(calibration)
     if reestimated is None:
-        return plots | {"coverage_alone": coverage}
+        return plots
     limit = calibration.verdict.limits.max_uncertainty_mm
     return plots | {
-        "running": _running(reestimated, np.array(calibration.tip_pen_mm)),
         "certainty": _certainty(reestimated, limit),
         "postures": _postures(reestimated),
-        "coverage": coverage,
         "residuals": _residuals(reestimated),
-        "histogram": _histogram(reestimated),
     }
 
 
@@ -61,10 +52,9 @@ def _misfits(calibration: CalibrationRecord) -> Figure:
     top = HEADROOM * float(np.nanmax(misfits[used], initial=1e-6))
     heights = np.where(np.isfinite(misfits), np.minimum(misfits, top), top)
     names = translate("paper", "included"), translate("paper", "excluded")
-    plot = LinePlot(
+    plot = MarkPlot(
         Axes(translate("paper", "RMS residual per image / px"), _image_number()),
         [Curve(name, name) for name in names],
-        is_joined=False,
     )
     parts = (np.where(part, heights, np.nan) for part in (used, ~used))
     plot.set_data(np.arange(1.0, len(misfits) + 1), *parts)
@@ -104,50 +94,19 @@ def _budget(calibration: CalibrationRecord) -> Figure:
     return plot
 
 
-def _tips(calibration: CalibrationRecord) -> Figure:
-    """Return the tip by each image minus the cone, camera frame."""
-    tips = np.array([f.tip_cam_mm for f in calibration.frames], dtype=np.float64)
-    used = np.array([f.used for f in calibration.frames], dtype=bool)
-    away = MICROMETRES * (tips[used] - np.array(calibration.cone_cam_mm))
-    title = translate("paper", "Tip per image relative to the cone / µm")
-    curves = [Curve(name, name) for name in "uvw"]
-    plot = LinePlot(Axes(title, _image_number()), curves, is_joined=False)
-    numbers = 1.0 + np.flatnonzero(used).astype(np.float64)
-    plot.set_data(numbers, *away.T)
-    return plot
-
-
-def _running(reestimated: ReestimatedPoses, tip: FloatArray) -> Figure:
-    """Return the convergence of the tip (3,), mm, with the images."""
-    title = translate("paper", "Tip from the first n images minus result / µm")
-    return _trace(title, reestimated, reestimated.tips - tip)
-
-
 def _certainty(reestimated: ReestimatedPoses, limit: float) -> Figure:
-    """Return U (k = 2) over the number of images, with its limit, mm."""
-    title = translate("paper", "U (k = 2) from the first n images / µm")
-    return _trace(title, reestimated, reestimated.uncertainties, limit)
+    """Return U (k = 2) over the number of images, with its limit, mm.
 
-
-def _trace(
-    title: str,
-    reestimated: ReestimatedPoses,
-    values: FloatArray,
-    limit: float | None = None,
-) -> TracePlot:
-    """Return values (M, 3), mm, of running tips that are certain enough to draw.
-
-    With a limit, mm, it is drawn, and zero is shown.
+    Tips by few images are left out until they are certain enough to draw.
     """
     worst = reestimated.uncertainties.max(axis=1)
     steady = worst <= STEADY * worst[-1]
+    title = translate("paper", "U (k = 2) from the first n images / µm")
     curves = [Curve(axis, axis) for axis in AXES]
-    axes = Axes(title, _image_number())
-    plot = TracePlot(axes, curves, y_zero=limit is not None)
-    if limit is not None:
-        plot.set_limit(MICROMETRES * limit)
+    plot = TracePlot(Axes(title, _image_number()), curves, y_zero=True)
+    plot.set_limit(MICROMETRES * limit)
     numbers = reestimated.numbers[steady].astype(np.float64)
-    plot.set_data(numbers, *(MICROMETRES * values[steady]).T)
+    plot.set_data(numbers, *(MICROMETRES * reestimated.uncertainties[steady]).T)
     return plot
 
 
@@ -160,41 +119,12 @@ def _residuals(reestimated: ReestimatedPoses) -> Figure:
     return plot
 
 
-def _histogram(reestimated: ReestimatedPoses) -> Figure:
-    """Return the histogram of the residuals with the normal curve."""
-    title = translate("paper", "Histogram of residuals with normal fit")
-    plot = Histogram(Axes(title, translate("paper", "residual / px")), "residual_px")
-    plot.set_data(reestimated.residuals.ravel())
-    return plot
-
-
 def _postures(reestimated: ReestimatedPoses) -> Figure:
     """Return the plot of the pen tilts from above, with the camera below."""
-    plot = PosturePlot(_of_dial(translate("paper", "Postures: tilt / \xb0")))
+    title = translate("paper", "Postures: tilt / \xb0")
+    plot = PosturePlot(Axes(title, translate("paper", "towards the camera")))
     plot.set_data(reestimated.tilts, reestimated.directions)
     return plot
-
-
-def _coverage(calibration: CalibrationRecord) -> Figure:
-    """Return the number of images in each field of the dial."""
-    coverage = calibration.coverage
-    inner, outer = np.degrees(TILT_RINGS)
-    places, counts = [(0.0, 0.0)], [coverage.upright]
-    for radius, of_ring in (
-        ((inner + outer) / 2, coverage.leaning),
-        ((outer + FARTHEST) / 2, coverage.leaning_far),
-    ):
-        angles = 2 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
-        places += zip(radius * np.cos(angles), radius * np.sin(angles), strict=True)
-        counts += of_ring
-    plot = PosturePlot(_of_dial(translate("paper", "Images per field")))
-    plot.set_data(np.zeros(0), np.zeros(0))
-    plot.set_labels(np.array(places), list(map(str, counts)))
-    return plot
-
-
-def _of_dial(title: str) -> Axes:
-    return Axes(title, translate("paper", "towards the camera"))
 
 
 def _image_number() -> str:

@@ -21,9 +21,8 @@ from lightpen_app.look.figures import (
 )
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.figure import Axes, Column, Figure
-from lightpen_app.widgets.plots import DASHES, LINE, SYMBOL, SYMBOLS, TONES, Curve, Plot
+from lightpen_app.widgets.plots import SYMBOL, SYMBOLS, TONES, Curve, Plot
 
-N_BINS = 41
 HEAD = 4 * GRID  # px, above the bars of a budget
 GROUP = 0.8  # of the room for a label, that its bars fill
 FARTHEST = 36.0  # degrees of tilt that are always shown
@@ -59,38 +58,6 @@ class SquarePlot(Plot):
 
     def _show_range(self, _view: object = None) -> None:
         self._item.setRange(self._range, padding=0.02)
-
-
-class DotPlot(SquarePlot):
-    """Dots of (x, y), such as residuals along the axes of the image.
-
-    ``names`` are the columns of the CSV file.
-    """
-
-    def __init__(self, axes: Axes, names: tuple[str, str]) -> None:
-        self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes)
-        self._names = names
-        self._dots = pg.ScatterPlotItem(pxMode=True, size=4)
-        self._item.addItem(self._dots)
-        self._restyle()
-
-    def set_data(self, x: FloatArray, y: FloatArray) -> None:
-        """Show dots at x (N,), y (N,); zero is in the middle."""
-        assert self._dots is not None
-        self._dots.setData(x, y)
-        self._columns = dict(zip(self._names, (x, y), strict=True))
-        reach = float(np.abs(np.concatenate([x, y])).max(initial=0.0)) or 1.0
-        self.set_range(QRectF(-reach, -reach, 2 * reach, 2 * reach))
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._dots is not None:
-            color = QColor(colors_of(self.palette()).accent)
-            color.setAlphaF(0.6)
-            self._dots.setPen(pg.mkPen(None))
-            self._dots.setBrush(pg.mkBrush(color))
 
 
 class ArrowPlot(SquarePlot):
@@ -167,49 +134,6 @@ class ArrowPlot(SquarePlot):
             self._frame.setPen(border)
 
 
-class Histogram(Plot):
-    """Histogram of the residuals with the fitted normal curve.
-
-    ``name`` is the column of the CSV file that holds the middles of the bins.
-    """
-
-    def __init__(self, axes: Axes, name: str) -> None:
-        self._bars: pg.BarGraphItem | None = None
-        super().__init__(axes)
-        self._name = name
-        self._bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
-        self._normal = pg.PlotCurveItem()
-        self._item.addItem(self._bars)
-        self._item.addItem(self._normal)
-        self._restyle()
-
-    def set_data(self, values: FloatArray) -> None:
-        """Show the distribution of values (N,)."""
-        assert self._bars is not None
-        if not len(values):
-            return
-        reach = float(np.abs(values).max()) or 1.0
-        heights, edges = np.histogram(values, N_BINS, (-reach, reach))
-        middles = (edges[1:] + edges[:-1]) / 2
-        step = edges[1] - edges[0]
-        self._bars.setOpts(x=middles, height=heights, width=0.9 * step)
-        fine = np.linspace(-reach, reach, 200)
-        sigma = float(np.sqrt(np.mean(values**2))) or 1.0
-        density = np.exp(-0.5 * (fine / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
-        expected = len(values) * step * density
-        self._normal.setData(fine, expected)
-        self._columns = {self._name: middles, "count": heights.astype(np.float64)}
-        self._fit(edges, np.concatenate([heights, expected]), y_zero=True)
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._bars is not None:
-            colors = colors_of(self.palette())
-            self._bars.setOpts(pen=pg.mkPen(None), brush=QColor(colors.partial))
-            self._normal.setPen(pg.mkPen(colors.text, width=1))
-
-
 def _around(points: FloatArray) -> QRectF:
     """Return the rectangle around points (N, 2), with room for arrows."""
     low, high = points.min(axis=0), points.max(axis=0)
@@ -283,43 +207,33 @@ class BarPlot(NamedPlot):
             bars.setOpts(pen=pg.mkPen(None), brush=pg.mkBrush(colors.tone(tone)))
 
 
-class LinePlot(NamedPlot):
-    """Values with marks, joined by lines or not, over a number; at most three."""
+class MarkPlot(NamedPlot):
+    """Values as marks over a number; at most three series."""
 
     has_symbols = True
 
-    def __init__(
-        self, axes: Axes, curves: Sequence[Curve], *, is_joined: bool = True
-    ) -> None:
+    def __init__(self, axes: Axes, curves: Sequence[Curve]) -> None:
         self._curves: list[pg.PlotDataItem] = []
-        self._is_joined = is_joined
         super().__init__(axes, curves)
         for _, symbol in zip(curves, SYMBOLS, strict=False):
-            curve = pg.PlotDataItem(symbol=symbol, symbolSize=SYMBOL)
+            curve = pg.PlotDataItem(pen=None, symbol=symbol, symbolSize=SYMBOL)
             self._item.addItem(curve)
             self._curves.append(curve)
         self._restyle()
 
-    def set_data(
-        self, x: FloatArray, *values: FloatArray, until: float = np.inf
-    ) -> None:
-        """Show values (N,) of each curve over x (N,), shown up to a limit.
-
-        The CSV file holds them all.
-        """
+    def set_data(self, x: FloatArray, *values: FloatArray) -> None:
+        """Show values (N,) of each series over x (N,)."""
         for curve, value in zip(self._curves, values, strict=True):
             known = np.isfinite(value)
             curve.setData(x[known], value[known])
-        self._columns = {"iteration": x, **self._named(*values)}
-        self._fit(x[x <= until], np.concatenate(values))
+        self._columns = {"number": x, **self._named(*values)}
+        self._fit(x, np.concatenate(values))
 
     @override
     def _restyle(self) -> None:
         super()._restyle()
         colors = colors_of(self.palette())
-        for curve, tone, dash in zip(self._curves, TONES, DASHES, strict=False):
-            line = pg.mkPen(colors.tone(tone), width=LINE, style=dash)
-            curve.setPen(line if self._is_joined else None)
+        for curve, tone in zip(self._curves, TONES, strict=False):
             curve.setSymbolPen(pg.mkPen(None))
             curve.setSymbolBrush(pg.mkBrush(colors.tone(tone)))
 

@@ -2594,14 +2594,6 @@
 <context>
     <name>MethodsPanel</name>
     <message>
-        <source>Objective / mm²</source>
-        <translation>目标函数 / mm²</translation>
-    </message>
-    <message>
-        <source>iteration</source>
-        <translation>迭代次数</translation>
-    </message>
-    <message>
         <source>Two-stage method and joint fit</source>
         <translation>两步法与联合拟合</translation>
     </message>
@@ -2632,10 +2624,6 @@
     <message>
         <source>Also for later swings here</source>
         <translation>也用于此工位以后的摆动</translation>
-    </message>
-    <message>
-        <source>Difference from final value / mm</source>
-        <translation>与最终值之差 / mm</translation>
     </message>
     <message>
         <source>Two-stage (paper)</source>
@@ -3351,20 +3339,12 @@ needed</source>
         <translation>镜头残余场 × {0}</translation>
     </message>
     <message>
-        <source>Residuals by axis / px</source>
-        <translation>各坐标轴的残差 / px</translation>
-    </message>
-    <message>
         <source>Residuals by LED / px</source>
         <translation>各 LED 的残差 / px</translation>
     </message>
     <message>
         <source>RMS</source>
         <translation>均方根</translation>
-    </message>
-    <message>
-        <source>Histogram with normal fit</source>
-        <translation>直方图与正态拟合</translation>
     </message>
     <message>
         <source>The arrows should look random. A pattern indicates an error of the intrinsics file; a single outlying LED, of the LED file.</source>
@@ -3381,14 +3361,6 @@ needed</source>
     <message>
         <source>mean y</source>
         <translation>y 均值</translation>
-    </message>
-    <message>
-        <source>residual / px</source>
-        <translation>残差 / px</translation>
-    </message>
-    <message>
-        <source>count</source>
-        <translation>数量</translation>
     </message>
 </context>
 <context>
@@ -9279,24 +9251,8 @@ needed</source>
         <translation>各 LED 的残差 / px</translation>
     </message>
     <message>
-        <source>Tip per image relative to the cone / µm</source>
-        <translation>单幅图像测头相对锥孔的偏差 / µm</translation>
-    </message>
-    <message>
-        <source>Tip from the first n images minus result / µm</source>
-        <translation>由前 n 幅图像求得的测头与结果之差 / µm</translation>
-    </message>
-    <message>
         <source>U (k = 2) from the first n images / µm</source>
         <translation>由前 n 幅图像得到的 U (k = 2) / µm</translation>
-    </message>
-    <message>
-        <source>Histogram of residuals with normal fit</source>
-        <translation>残差直方图与正态拟合</translation>
-    </message>
-    <message>
-        <source>Images per field</source>
-        <translation>各区域的图像数</translation>
     </message>
     <message>
         <source>LED</source>
@@ -9321,10 +9277,6 @@ needed</source>
     <message>
         <source>Residuals over the image × {0}</source>
         <translation>图像上的残差 × {0}</translation>
-    </message>
-    <message>
-        <source>residual / px</source>
-        <translation>残差 / px</translation>
     </message>
     <message>
         <source>Postures: tilt / °</source>

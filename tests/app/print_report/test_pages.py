@@ -11,7 +11,7 @@ from lightpen_app.print_report.pages import ROOM, lay_out
 from lightpen_app.print_report.template import Piece, charts, paragraph, table
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.plots import Curve
-from lightpen_app.widgets.result_plots import LinePlot
+from lightpen_app.widgets.result_plots import MarkPlot
 
 pytestmark = pytest.mark.usefixtures("qapp")
 N_LINES = 44  # paragraphs of a line that fit on a page
@@ -72,7 +72,7 @@ def test_the_head_of_a_table_is_repeated_where_it_goes_on() -> None:
 
 
 def test_plots_are_as_wide_and_high_as_stated() -> None:
-    plot = LinePlot(Axes("tip"), [Curve("x")])
+    plot = MarkPlot(Axes("tip"), [Curve("x")])
     document = lay_out(charts({"tip": plot}, 1000.0))
 
     assert document.documentLayout().documentSize().height() >= 1000

@@ -27,9 +27,7 @@ from lightpen_app.widgets.result_plots import (
     ArrowPlot,
     BarPlot,
     BudgetPlot,
-    DotPlot,
-    Histogram,
-    LinePlot,
+    MarkPlot,
     PosturePlot,
 )
 
@@ -169,35 +167,6 @@ def test_arrows_are_enlarged_by_a_round_factor(size: float, scale: float) -> Non
     assert arrow_scale(residuals, 2448) == pytest.approx(scale)
 
 
-def test_a_histogram_counts_every_residual(qtbot: QtBot) -> None:
-    plot = Histogram(Axes("Residuals / px"), "residual_px")
-    show(qtbot, plot)
-    values = np.random.default_rng(1).normal(0, 0.05, 4000)
-
-    plot.set_data(values)
-
-    assert numbers(plot, "count").sum() == 4000
-    middles = numbers(plot, "residual_px")
-    np.testing.assert_allclose(middles, -middles[::-1], atol=1e-12)
-    plot.set_data(np.zeros(0))
-    plot.set_data(np.zeros(3))
-    assert numbers(plot, "count").sum() == 3
-
-
-def test_dots_keep_their_numbers(qtbot: QtBot) -> None:
-    plot = DotPlot(Axes("Residuals / px", "x", "y"), ("x_px", "y_px"))
-    show(qtbot, plot)
-
-    plot.set_data(np.array([1.0, 2.0]), np.array([3.0, -5.0]))
-
-    np.testing.assert_array_equal(numbers(plot, "y_px"), [3, -5])
-    (left, right), (bottom, top) = plot.ranges()
-    assert left <= -5  # a unit of x is as long as one of y, zero in the middle
-    assert right >= 5
-    assert bottom <= -5
-    assert top >= 5
-
-
 @pytest.fixture
 def misfits(qtbot: QtBot) -> MisfitPlot:
     plot = MisfitPlot(Axes("RMS residual / px", "image"))
@@ -325,7 +294,7 @@ def test_the_name_of_an_axis_that_is_too_short_for_it_is_left_out(qtbot: QtBot) 
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
-    plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")])
+    plot = MarkPlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")])
     show(qtbot, plot)
     bars = BarPlot(Axes("U"), [Curve("x_um", "x"), Curve("y_um", "y")], "part")
     show(qtbot, bars)
@@ -333,18 +302,6 @@ def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
     for each in (plot, bars):
         each.set_names(["a", "b"])
         assert each.names() == ("a", "b")
-
-
-def test_later_steps_are_saved_but_not_shown(qtbot: QtBot) -> None:
-    plot = LinePlot(Axes("Objective"), [Curve("objective")])
-    show(qtbot, plot)
-    steps = np.arange(60.0)
-
-    plot.set_data(steps, 1 / (1 + steps), until=10)
-
-    (_, right), _ = plot.ranges()
-    assert 10 <= right < 12
-    assert len(numbers(plot, "objective")) == 60
 
 
 def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) -> None:
@@ -364,7 +321,7 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
 def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
     bars = BarPlot(Axes("LEDs"), [Curve("rms")], "led")
-    lines = LinePlot(Axes("Tip"), [Curve("x_um")])
+    lines = MarkPlot(Axes("Tip"), [Curve("x_um")])
     for plot in (bars, lines):
         show(qtbot, plot)
     before = bars.n_items(), lines.n_items()
@@ -377,7 +334,7 @@ def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
 
 
 def test_one_plot_is_enlarged_over_its_neighbours(qtbot: QtBot) -> None:
-    cards = [PlotCard(DotPlot(Axes(name), ("x", "y")), name) for name in "abc"]
+    cards = [PlotCard(PosturePlot(Axes(name)), name) for name in "abc"]
     grid = PlotGrid(cards)
     qtbot.addWidget(grid)
     grid.resize(600, 400)

@@ -31,14 +31,9 @@ from lightpen_app.widgets.result_plots import (
     ArrowPlot,
     BarPlot,
     BudgetPlot,
-    DotPlot,
-    Histogram,
-    LinePlot,
     PosturePlot,
 )
 from lightpen_app.widgets.tables import Figures, NumberTable
-
-SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a plot
 
 
 class PlotsPanel(Translated, QWidget):
@@ -80,29 +75,18 @@ class PlotsPanel(Translated, QWidget):
 
 
 class ResidualsPanel(PlotsPanel):
-    """Residuals over the image, by axis, by LED, and how they are distributed."""
+    """Residuals over the image and by LED."""
 
     def __init__(self) -> None:
         # Widgets
-        x, y = self.tr("x / px"), self.tr("y / px")
         self._arrows, self._lens = ArrowPlot(Axes("")), ArrowPlot(Axes(""))
-        axes = Axes(self.tr("Residuals by axis / px"), x, y)
-        self._dots = DotPlot(axes, ("residual_x_px", "residual_y_px"))
         series = Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")
         axes = Axes(self.tr("Residuals by LED / px"), self.tr("LED"))
         self._leds = BarPlot(axes, series, "led")
-        axes = Axes(
-            self.tr("Histogram with normal fit"),
-            self.tr("residual / px"),
-            self.tr("count"),
-        )
-        self._histogram = Histogram(axes, "residual_px")
         super().__init__(
             [
                 PlotCard(self._arrows, "residuals-over-image"),
                 PlotCard(self._leds, "residuals-of-leds"),
-                PlotCard(self._dots, "residuals-by-axis"),
-                PlotCard(self._histogram, "residuals-histogram"),
                 PlotCard(self._lens, "lens-field"),
             ]
         )
@@ -182,8 +166,6 @@ class ResidualsPanel(PlotsPanel):
     ) -> None:
         """Draw residuals (N, 2), px, at points (N, 2), and the residuals by LED."""
         self._arrows.set_data(camera.image_size, points, residuals)
-        self._dots.set_data(residuals[:, 0], residuals[:, 1])
-        self._histogram.set_data(residuals.ravel())
         numbers = [str(led + 1) for led in range(len(rms))]
         self._leds.set_data(numbers, rms, mean[:, 0], mean[:, 1])
         self._retranslate()
@@ -257,28 +239,18 @@ class UncertaintyPanel(PlotsPanel):
 
 
 class MethodsPanel(PlotsPanel):
-    """Convergence of the paper's method, compared with the joint fit."""
+    """The paper's method, compared with the joint fit."""
 
     method_chosen = Signal(str)  # `Method` to be reported
 
     def __init__(self) -> None:
         # Widgets
-        axes = Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
-        self._objective = LinePlot(axes, [Curve("objective_mm2")])
-        title = self.tr("Difference from final value / mm")
-        axes = Axes(title, self.tr("iteration"))
-        self._change = LinePlot(axes, [Curve(f"{axis}_mm", axis) for axis in AXES])
-        super().__init__(
-            [
-                PlotCard(self._objective, "convergence-objective"),
-                PlotCard(self._change, "convergence-tip"),
-            ]
-        )
+        super().__init__(())
         self._table = self.say(NumberTable(), self.tr("Two-stage method and joint fit"))
         self._reports = self.say(QCheckBox(), self.tr("Report this method"))
 
         # Layout
-        fill(self._layout, self._table, self._reports)
+        fill(self._layout, self._table, self._reports, (QWidget(), 10))
 
         # Connections
         self._reports.clicked.connect(self._on_reports_clicked)
@@ -294,12 +266,6 @@ class MethodsPanel(PlotsPanel):
     @override
     def _show(self, solution: Solution) -> None:
         self._reports.setChecked(solution.calibration.method == "two-stage")
-        fit = solution.calibration.two_stage
-        steps = np.arange(len(fit.objectives), dtype=np.float64)
-        settled = float(np.sum(fit.increments > SETTLED) + 1)
-        self._objective.set_data(steps, fit.objectives, until=settled)
-        tips = fit.iterates[:, :3] - fit.tip_pen
-        self._change.set_data(steps, *tips.T, until=settled)
         self._retranslate()
 
     @override
