@@ -1380,14 +1380,6 @@
         <translation>均方根 / px（×：已排除）</translation>
     </message>
     <message>
-        <source>drag down to exclude</source>
-        <translation>向下拖动以剔除</translation>
-    </message>
-    <message>
-        <source>Exclude {0} above {1} px</source>
-        <translation>剔除高于 {1} px 的 {0} 幅</translation>
-    </message>
-    <message>
         <source>{0} {1}</source>
         <translation>{1} {0} 幅</translation>
     </message>
@@ -4834,25 +4826,6 @@ needed</source>
     <message>
         <source>Images are correlated: noise variance × {0}</source>
         <translation>图像相关：噪声方差 × {0}</translation>
-    </message>
-</context>
-<context>
-    <name>UndoButtons</name>
-    <message>
-        <source>Nothing to undo</source>
-        <translation>没有可撤销的操作</translation>
-    </message>
-    <message>
-        <source>Nothing to redo</source>
-        <translation>没有可重做的操作</translation>
-    </message>
-    <message>
-        <source>Undo</source>
-        <translation>撤销</translation>
-    </message>
-    <message>
-        <source>Redo</source>
-        <translation>重做</translation>
     </message>
 </context>
 <context>

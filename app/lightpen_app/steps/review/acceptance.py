@@ -79,9 +79,6 @@ class AcceptanceControl(QObject):
     def _on_refused(self) -> None:
         if self._run.status.result is None:
             self._view.reason.refuse()
-        images = self._view.tabs.images()
-        if images is not None:
-            images.forget_refused()
 
 
 class PressTestControl(QObject):

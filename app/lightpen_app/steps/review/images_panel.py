@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal, SignalInstance
-from PySide6.QtGui import QKeySequence, QShortcut, QUndoStack
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -32,7 +32,6 @@ from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.fitting import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.live_markers import CameraSwitch
-from lightpen_app.widgets.tables import UndoableStep, UndoButtons
 from lightpen_app.work.job import LatestJob, Report
 
 TABLE_WIDTH = 38 * GRID
@@ -72,14 +71,11 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._job = LatestJob(self)
         self._loading: tuple[RecordSource, int, int] | None = None
         self._shown: tuple[int, int] | None = None  # number and camera
-        self._steps = QUndoStack(self)
-        self._is_awaited = False  # whether the last step has no solution yet
 
         # Widgets
         self._table = ImageTable()
         self._exclude = self.make_button(self.tr("Exclude"), self._on_exclude_clicked)
         self._include = self.make_button(self.tr("Include"), self._on_include_clicked)
-        self._undo = UndoButtons(self._steps, self)
         self._count = text_label(TextSize.SMALL, Tone.QUIET)
         self._view = ResidualView()
         self._view.setMinimumHeight(LEAST_HEIGHT)
@@ -95,7 +91,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         layout.addWidget(self._switch, 4, 0)  # the image is too narrow for it
         layout.addWidget(self._count, 5, 0)
         horizontal_layout(layout, (self._exclude, 1), (self._include, 1), at=(6, 0))
-        layout.addWidget(self._undo, 7, 0)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
         self._use_room()
@@ -105,7 +100,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._table.selection_changed.connect(self._refresh_buttons)
         self._switch.value_changed.connect(self._on_choice_changed)
         self._misfits.number_chosen.connect(self._table.choose)
-        self._misfits.limit_set.connect(self._exclude_images)
         self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._shortcut(QKeySequence.StandardKey.Delete, self._exclude.click)
         self._shortcut(Qt.Key.Key_Insert, self._include.click)
@@ -137,9 +131,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
     def set_value(self, solution: Solution | None, _limit: float | None = None) -> None:
         """Show the images of another solution; the chosen ones stay chosen."""
         before, self._solution = self._solution, solution
-        self._is_awaited = False
         if solution is None or before is None or before.source != solution.source:
-            self._steps.clear()
             self.shut_down()
             self._clear_view()
         if not self._is_of_rig():
@@ -158,16 +150,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
     def set_locked(self, why: str) -> None:
         """Lock the exclusion of images, with the reason, or unlock it."""
         self._why_locked = why
-        self._undo.set_locked(why)
-        self._misfits.set_limit_movable(not why)
         self._refresh_buttons()
-
-    def forget_refused(self) -> None:
-        """Remove the last step from the undo stack if it was refused."""
-        if self._is_awaited:
-            self._is_awaited = False
-            self._steps.command(self._steps.index() - 1).setObsolete(True)
-            self._steps.undo()
 
     def shut_down(self) -> None:
         """Stop reading an image."""
@@ -183,9 +166,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
     def _retranslate(self) -> None:
         self._misfits.set_axes(
             Axes(self.tr("RMS / px (x: excluded)"), self.tr("image"))
-        )
-        self._misfits.set_limit_words(
-            self.tr("drag down to exclude"), self.tr("Exclude {0} above {1} px")
         )
         self._refresh_texts()
         self._refresh_buttons()
@@ -330,7 +310,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
             self._count,
             self._exclude,
             self._include,
-            self._undo,
             self._view,
             self._caption,
         ):
@@ -343,25 +322,12 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
             self._grid.setColumnStretch(1, 0 if enlarged else 1)
 
     def _on_exclude_clicked(self) -> None:
-        self._exclude_images(
-            [row.number for row in self._table.selected() if row.is_used]
-        )
+        rows = self._table.selected()
+        self.exclude_requested.emit([row.number for row in rows if row.is_used])
 
     def _on_include_clicked(self) -> None:
         rows = self._table.selected()
-        numbers = [row.number for row in rows if row.can_be_included]
-        self._do(self.include_requested, self.exclude_requested, numbers)
-
-    def _exclude_images(self, numbers: list[int]) -> None:
-        self._do(self.exclude_requested, self.include_requested, numbers)
-
-    def _do(
-        self, wish: SignalInstance, opposite: SignalInstance, numbers: list[int]
-    ) -> None:
-        self._is_awaited = True
-        self._steps.push(
-            UndoableStep(lambda: wish.emit(numbers), lambda: opposite.emit(numbers))
-        )
+        self.include_requested.emit([r.number for r in rows if r.can_be_included])
 
 
 def _decoded(solution: Solution, number: int, camera: int, report: Report) -> _Decoded:

@@ -5,22 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QPoint, QPointF, QRectF, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen_app.look.figures import arrow_lines
-from lightpen_app.look.theme import DARK, GRID, TextSize, colors_of, font
-from lightpen_app.look.words import number_text
+from lightpen_app.look.theme import DARK, colors_of
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.plots import Plot
 
-LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
-LIMIT_GRIP = 0.94
-LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
-LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
 
 
@@ -28,39 +23,25 @@ class MisfitPlot(Plot):
     """The misfit of each image over its number; a click chooses an image.
 
     Images that do not take part are crosses. Where they are far off, they are drawn at
-    the upper edge, so that the others can still be distinguished. A line above the used
-    images can be dragged down to exclude up to the worse half of them.
+    the upper edge, so that the others can still be distinguished.
     """
 
     number_chosen = Signal(int)  # of the image that was clicked
-    # list of int: numbers of the images above which the line was left
-    limit_set = Signal(list)
 
     def __init__(self, axes: Axes) -> None:
         self._used: pg.ScatterPlotItem | None = None
         super().__init__(axes)
         self._places: dict[int, tuple[float, float]] = {}
         self._number: int | None = None
-        self._in_use: dict[int, tuple[float, float]] = {}
-        self._limit_words = ("", "")
 
         # Widgets
         self._used = pg.ScatterPlotItem(pxMode=True, size=5)
         self._out = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
         self._chosen = pg.ScatterPlotItem(pxMode=True, size=15, symbol="o")
-        self._above = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
-        self._limit = pg.InfiniteLine(
-            angle=0, movable=True, label="", labelOpts=LIMIT_LABEL
-        )
-        self._limit.label.setFont(font(TextSize.SMALL))
-        self._limit.addMarker("<|>", LIMIT_GRIP, 2 * GRID)
-        self._limit.hide()
-        for item in (self._chosen, self._used, self._out, self._above, self._limit):
+        for item in (self._chosen, self._used, self._out):
             self._item.addItem(item)
 
         # Connections
-        self._limit.sigPositionChanged.connect(self._on_limit_moved)
-        self._limit.sigPositionChangeFinished.connect(self._on_limit_left)
         self._used.sigClicked.connect(self._on_clicked)
         self._out.sigClicked.connect(self._on_clicked)
 
@@ -82,10 +63,8 @@ class MisfitPlot(Plot):
             "misfit_px": misfits,
             "used": used.astype(np.float64),
         }
-        self._in_use = {n: self._places[n] for n in numbers[used].tolist()}
         self._fit(x, np.append(heights, 1.2 * heights.max(initial=0.0)), y_zero=True)
         self.set_number(self._number)
-        self._rest_limit(heights[used])
 
     def number(self) -> int | None:
         """Return the number of the image that is marked."""
@@ -97,26 +76,6 @@ class MisfitPlot(Plot):
         place = None if number is None else self._places.get(number)
         points = [] if place is None else [place]
         self._chosen.setData(pos=np.array(points).reshape(-1, 2))
-
-    def set_limit_words(self, at_rest: str, above: str) -> None:
-        """Set the text of the line; ``above`` has fields for a count and for px."""
-        self._limit_words = at_rest, above
-        self._on_limit_moved()
-
-    def set_limit_movable(self, movable: bool) -> None:
-        """Let images be excluded by the line, or not."""
-        self._limit.setMovable(movable)
-        self._limit.setVisible(movable and bool(self._in_use))
-
-    @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._on_limit_moved()
-
-    def limit_pixel(self) -> QPoint:
-        """Return the handle of the line, in px of `canvas`."""
-        left, right = self.ranges()[0]
-        return self._pixel(left + LIMIT_GRIP * (right - left), self._limit.value())
 
     def place_of(self, number: int) -> tuple[float, float]:
         """Return x and y at which an image is drawn."""
@@ -132,14 +91,6 @@ class MisfitPlot(Plot):
         return canvas
 
     @override
-    def png(self, mark: str = "") -> bytes:
-        was_visible = self._limit.isVisible()
-        self._limit.hide()  # only the curve is drawn
-        picture = super().png(mark)
-        self._limit.setVisible(was_visible)
-        return picture
-
-    @override
     def _restyle(self) -> None:
         super()._restyle()
         if self._used is None:
@@ -151,44 +102,11 @@ class MisfitPlot(Plot):
         self._out.setBrush(pg.mkBrush(None))
         self._chosen.setPen(pg.mkPen(colors.text, width=2))
         self._chosen.setBrush(pg.mkBrush(None))
-        self._above.setPen(pg.mkPen(colors.warn, width=2))
-        self._limit.setPen(pg.mkPen(colors.warn, width=2))
-        self._limit.setHoverPen(pg.mkPen(colors.text, width=2))
-        self._limit.label.setColor(colors.warn)
-        self._limit.label.fill = pg.mkBrush(colors.panel)  # over the dots
 
     def _pixel(self, x: float, y: float) -> QPoint:
         self._graphics.fit()
         scene = self._item.vb.mapViewToScene(QPointF(x, y))
         return QPoint(self._graphics.mapFromScene(scene))
-
-    def _rest_limit(self, heights: FloatArray) -> None:
-        """Place the line above residuals (N,), where it is visible."""
-        if len(heights):
-            rest = LIMIT_REST * float(heights.max())
-            self._limit.setBounds((float(np.median(heights)), rest))
-            self._limit.setValue(rest)
-        self.set_limit_movable(self._limit.movable)
-        self._on_limit_moved()
-
-    def _numbers_above(self) -> list[int]:
-        limit = self._limit.value()
-        return [number for number, (_, y) in self._in_use.items() if y > limit]
-
-    def _on_limit_moved(self, _line: object = None) -> None:
-        numbers = self._numbers_above()
-        places = [self._in_use[number] for number in numbers]
-        self._above.setData(pos=np.array(places).reshape(-1, 2))
-        at_rest, above = self._limit_words
-        words = above.format(len(numbers), number_text(self._limit.value(), 3))
-        self._limit.label.setFormat(words if numbers else at_rest)
-        # At rest the line is at the top, where a low plot has no room for words.
-        self._limit.label.setVisible(bool(numbers) or self.height() >= LEAST_WORDED)
-
-    def _on_limit_left(self, _line: object = None) -> None:
-        numbers = self._numbers_above()
-        if numbers:
-            self.limit_set.emit(numbers)
 
     def _on_clicked(
         self, _plot: object, points: "list[pg.SpotItem]", _event: object

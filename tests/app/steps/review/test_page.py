@@ -63,7 +63,7 @@ from lightpen.swing.swing_recorder import (
 )
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.control import PrintReportWindow
-from lightpen_app.steps.review.image_table import STATE, ImageTable
+from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.page import ReviewPage
@@ -1078,11 +1078,10 @@ def test_a_click_on_the_misfit_chooses_the_image(
 
 
 @pytest.mark.slow
-def test_keys_take_several_images_out_undo_redo_and_put_them_back(
+def test_keys_take_several_images_out_and_put_them_back(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     table(page).setFocus()
-    control = Qt.KeyboardModifier.ControlModifier
     shift = Qt.KeyboardModifier.ShiftModifier
     for _ in range(2):
         QTest.keyClick(table(page), Qt.Key.Key_Down, shift)
@@ -1091,57 +1090,8 @@ def test_keys_take_several_images_out_undo_redo_and_put_them_back(
     QTest.keyClick(table(page), Qt.Key.Key_Delete)
     await_count(qtbot, page, three_fewer)
     assert len(table(page).selected()) == 3
-    QTest.keyClick(table(page), Qt.Key.Key_Z, control)
-    await_count(qtbot, page, included(N_IMAGES))
-    assert not button(page, "Undo").isEnabled()
-    QTest.keyClick(table(page), Qt.Key.Key_Z, control | shift)
-    await_count(qtbot, page, three_fewer)
-
     QTest.keyClick(table(page), Qt.Key.Key_Insert)
     await_count(qtbot, page, included(N_IMAGES))
-
-
-@pytest.mark.slow
-def test_the_line_over_the_misfits_takes_out_what_it_is_drawn_below(
-    page: ReviewPage, qtbot: QtBot
-) -> None:
-    plot = the(page, MisfitPlot)
-    heights = sorted(plot.pixel_of(n).y() for n in range(1, N_IMAGES + 1))
-    # The widest gap that is so far down that the mouse is drawn, not clicked.
-    n_above = 3 + int(np.argmax(np.diff(heights[2 : N_IMAGES // 2])))
-    wanted = sum(heights[n_above - 1 : n_above + 1]) // 2
-    grip = plot.limit_pixel()
-
-    drag(plot.canvas(), grip, QPoint(grip.x(), wanted))
-
-    n_used = N_IMAGES - n_above
-    await_count(qtbot, page, included(n_used, f"{n_above} excluded manually"))
-    click(page, "Undo")
-    await_count(qtbot, page, included(N_IMAGES))
-
-
-def test_no_line_is_saved_with_the_misfits(page: ReviewPage) -> None:
-    plot = the(page, MisfitPlot)
-    with_line = plot.png()
-
-    plot.set_limit_movable(False)
-
-    assert plot.png() == with_line
-
-
-def test_the_line_leaves_the_better_half_of_the_images(
-    page: ReviewPage, qtbot: QtBot
-) -> None:
-    plot = the(page, MisfitPlot)
-
-    drag(plot.canvas(), plot.limit_pixel(), plot.limit_pixel() + QPoint(0, 500))
-
-    half = N_IMAGES // 2
-    await_count(qtbot, page, included(half, f"{half} excluded manually"))
-    assert page.lead() == "Next: include the images again, or repeat the swing."
-    table = the(page, ImageTable)
-    states = [table.model().index(i, STATE).data() for i in range(N_IMAGES)]
-    assert states.count("excluded") == half  # short enough for its column
 
 
 def test_an_image_that_cannot_be_read_says_why_and_cannot_be_put_back(bed: Bed) -> None:
