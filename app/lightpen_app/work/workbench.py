@@ -30,7 +30,7 @@ from lightpen_app.work.settings import Settings
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
-    from lightpen.record.folder import CameraTrial
+    from lightpen.record.folder import CalibratedCamera
 
 
 class ArchiveWriter(QObject):
@@ -55,14 +55,14 @@ class ArchiveWriter(QObject):
         logbook = self._logbook
         Job(lambda _: logbook.enter_owed(), self).start()
 
-    def keep_camera_trial(self, trial: "CameraTrial", names: Names) -> None:
+    def keep_camera_calibration(self, camera: "CalibratedCamera", names: Names) -> None:
         """Keep the result of the calibration of a camera, and enter it."""
-        from lightpen.record.folder import keep_camera_trial
+        from lightpen.record.folder import keep_camera_calibration
 
         logbook, folder, now = self._logbook, self._folder, self._now
 
         def keep(_: Report) -> None:
-            keep_camera_trial(folder, trial, names, now())
+            keep_camera_calibration(folder, camera, names, now())
             logbook.enter_owed()
 
         job = Job(keep, self)

@@ -5,15 +5,12 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 
-import numpy as np
-from PySide6.QtCore import QCoreApplication, QObject, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import QCoreApplication, QObject, Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.protocol import Frame
-from lightpen.errors import UsageError
 from lightpen.messages import Message
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import grid_layout
@@ -64,61 +61,6 @@ USUAL = {
         (BoardKind.ASYMMETRIC_CIRCLES, "4x11:20:10"),
     )
 }
-PICTURE_HEIGHT = 12 * GRID  # px
-
-
-class BoardPicture(QWidget):
-    """Draws a board as it looks from the front."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._board: Board | None = None
-        self.setFixedHeight(PICTURE_HEIGHT)
-
-    def set_value(self, board: Board | None) -> None:
-        """Draw another board, or none."""
-        self._board = board
-        self.update()
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        board = self._board
-        if board is None:
-            return
-        places, side = _cells(board)
-        least, most = places.min(axis=0) - side, places.max(axis=0) + side
-        scale = float(
-            min(
-                self.width() / np.ptp([least, most], axis=0)[0],
-                self.height() / np.ptp([least, most], axis=0)[1],
-            )
-        )
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        width, height = ((most - least) * scale).tolist()
-        painter.translate(0.5 * (self.width() - width), 0.0)
-        painter.fillRect(QRectF(0.0, 0.0, width, height), Qt.GlobalColor.white)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(Qt.GlobalColor.black)
-        half = 0.5 * side * scale
-        for x, y in ((places - least) * scale).tolist():
-            if board.kind.is_circles:
-                painter.drawEllipse(QPointF(x, y), half, half)
-            else:
-                painter.drawRect(QRectF(x - half, y - half, 2 * half, 2 * half))
-
-
-def _cells(board: Board) -> tuple[np.ndarray, float]:
-    """Return the centres of the black marks, (N, 2), and their side or diameter, mm."""
-    if board.kind.is_circles:
-        return board.points[:, :2], board.detail
-    extra = 0 if board.kind.has_markers else 1
-    columns, rows = board.columns + extra, board.rows + extra
-    y, x = np.mgrid[:rows, :columns]
-    lattice = np.stack([x.ravel(), y.ravel()], axis=-1).astype(np.float64)
-    return lattice[(x + y).ravel() % 2 == 0] * board.pitch, board.pitch
-
-
 # Row and column of kind, dictionary, columns, rows, pitch and detail: most boards have
 # no dictionary and no detail.
 PLACES = (0, 0), (2, 1), (1, 0), (1, 1), (0, 1), (2, 0)
@@ -148,7 +90,6 @@ class BoardForm(Translated, QWidget):
                 ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
             )
             choice.setMinimumContentsLength(8)
-        self._picture = BoardPicture()
         fields = (
             self._kind,
             self._dictionary,
@@ -163,7 +104,6 @@ class BoardForm(Translated, QWidget):
         layout = grid_layout(self, spacing=(GRID, GRID))
         for label, widget, place in zip(self._labels, fields, PLACES, strict=True):
             add_labelled(layout, label, widget, at=place)
-        layout.addWidget(self._picture, 3, 0, 1, 2)
         layout.setColumnStretch(0, 1)
         layout.setColumnStretch(1, 1)
 
@@ -213,11 +153,6 @@ class BoardForm(Translated, QWidget):
         self.set_board(USUAL[kind])
 
     def _on_changed(self) -> None:
-        try:
-            board = self.board()
-        except UsageError:
-            board = None  # the reason is shown when the board is used
-        self._picture.set_value(board)
         self._retranslate()
         self.changed.emit()
 

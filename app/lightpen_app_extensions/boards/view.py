@@ -27,7 +27,7 @@ from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.names import Origin
 from lightpen.model.uncertainty_map import UncertaintyMap, map_uncertainty
-from lightpen.record.folder import CameraTrial, TrialOutcome
+from lightpen.record.folder import CalibratedCamera
 from lightpen_app.look.languages import worded
 from lightpen_app.look.theme import DARK, TextSize, Tone, font
 from lightpen_app.widgets.image_view import ImageView
@@ -167,13 +167,12 @@ class BoardCalibration(QObject):
     progressed = Signal(float)  # of the computation, 0 to 1
     ended = Signal()
     saved = Signal(str)  # a camera file was written
-    concluded = Signal(object)  # CameraTrial: outcome of an attempt
+    concluded = Signal(object)  # CalibratedCamera: its file was written
 
     def __init__(self, capture: BoardCapture, live: LiveView, parent: QObject) -> None:
         super().__init__(parent)
         self._capture, self._live = capture, live
         self._computed: ComputedCamera | None = None
-        self._is_saved = False
         self._job = LatestJob(self)
         self._remark: Callable[[], StatusMessage] = StatusMessage
 
@@ -215,27 +214,21 @@ class BoardCalibration(QObject):
         """Write the camera file and offer it for use."""
         if self._computed is None:
             return
-        found = self._computed.found
-        trial = self._trial(TrialOutcome.ACCEPTED)
-        self._is_saved = True  # reset if saving fails
-        camera = replace(found.camera, serial=trial.serial)
+        serial = self._live.serial if self._is_live else ""
+        camera = replace(self._computed.found.camera, serial=serial)
         job = Job(partial(save_camera, camera, path), self)
-        refused = partial(self._on_save_refused, trial, self._computed)
-        job.start(partial(self._on_saved, trial), refused)
+        job.start(partial(self._on_saved, self._computed, serial), self._on_refused)
 
-    def conclude(self) -> None:
-        """Discard the result, and report the outcome of the attempt."""
-        if self._computed is None and self._capture.state.n_kept:
-            self.concluded.emit(self._trial(TrialOutcome.ABANDONED))
-        self._give_up()
-
-    def _give_up(self) -> None:
-        """Cancel the computation and discard an unused result."""
+    def discard(self) -> None:
+        """Cancel the computation and discard the result."""
         self.cancel()
-        if self._computed is not None and not self._is_saved:
-            self.concluded.emit(self._trial(TrialOutcome.REFUSED))
         self._computed = None
         self.found_changed.emit()
+
+    @property
+    def _is_live(self) -> bool:
+        """Whether the views are of live images."""
+        return self._capture.state.capture is not None
 
     def cancel(self) -> None:
         """End the computation; what was found before stays."""
@@ -267,11 +260,8 @@ class BoardCalibration(QObject):
 
     def _on_found(self, is_of_folder: bool, computed: ComputedCamera) -> None:
         if is_of_folder:
-            self.conclude()
             self._capture.start(None)
-        else:
-            self._give_up()
-        self._computed, self._is_saved = computed, False
+        self._computed = computed
         self.found_changed.emit()
         self.set_remark(partial(self._found_message, computed.found))
 
@@ -281,42 +271,27 @@ class BoardCalibration(QObject):
             return StatusMessage.warning(words)
         return StatusMessage.good(self.tr("Camera calibrated."))
 
-    def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
+    def _on_saved(self, computed: ComputedCamera, serial: str, file: InputFile) -> None:
+        found, origin = computed.found, Origin.RECORDED
+        if self._is_live:
+            is_real = self._live.operator is None
+            origin = Origin.LIVE if is_real else Origin.SIMULATED
+        names = found.views.names
         self.set_remark(partial(self._saved_message, file))
-        self.concluded.emit(replace(trial, camera_file=file))
+        self.concluded.emit(
+            CalibratedCamera(
+                board=found.views.board.name,
+                serial=serial,
+                origin=origin,
+                images={n: h for n, h in computed.hashes.items() if n in names},
+                found=plain(intrinsics_record(found, ())),
+                camera_file=file,
+            )
+        )
         self.saved.emit(str(file.path))
 
     def _saved_message(self, file: InputFile) -> StatusMessage:
         return StatusMessage.good(self.tr("Saved and in use: {0}").format(file.path))
-
-    def _on_save_refused(
-        self, trial: CameraTrial, computed: ComputedCamera, sentence: str
-    ) -> None:
-        self.set_remark(partial(StatusMessage.fault, sentence))
-        if computed is self._computed:
-            self._is_saved = False
-        else:  # it was left meanwhile
-            self.concluded.emit(replace(trial, outcome=TrialOutcome.REFUSED))
-
-    def _trial(self, outcome: TrialOutcome) -> CameraTrial:
-        state, computed, live = self._capture.state, self._computed, self._live
-        is_live = state.capture is not None
-        board = "" if state.capture is None else state.capture.board.name
-        images = state.hashes
-        if computed is not None:
-            board, names = computed.found.views.board.name, computed.found.views.names
-            images = {n: h for n, h in computed.hashes.items() if n in names}
-        origin = Origin.LIVE if live.operator is None else Origin.SIMULATED
-        return CameraTrial(
-            outcome=outcome,
-            board=board,
-            serial=live.serial if is_live else "",
-            origin=origin if is_live else Origin.RECORDED,
-            images=images,
-            found=None
-            if computed is None
-            else plain(intrinsics_record(computed.found, ())),
-        )
 
 
 def calibrate_by_views(

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
-from lightpen.record.folder import CameraTrial
+from lightpen.record.folder import CalibratedCamera
 from lightpen_app.face import WindowService
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -50,7 +50,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     """Leads the board through the image, calibrates, and saves the camera file."""
 
     saved = Signal(str)  # a camera file was written
-    concluded = Signal(object)  # CameraTrial: the outcome of an attempt
+    concluded = Signal(object)  # CalibratedCamera: its file was written
 
     CLOSING_KEYS = (Qt.Key.Key_Escape,)
 
@@ -144,7 +144,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
-        self._calibration.conclude()
+        self._calibration.discard()
         self._capture.start(None)
         self._hold_simulated(None)
         self._calibration.set_remark(StatusMessage)
@@ -172,7 +172,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._capture.stop()
             self._hold_simulated(None)
         elif not is_refusing(self):
-            self._calibration.conclude()
+            self._calibration.discard()
             self._calibration.set_remark(StatusMessage)
             board = self._named_board()
             self._capture.start(board)
@@ -322,6 +322,6 @@ class BoardsService(WindowService["BoardWindow"]):
 
         self._show_window(make)
 
-    def _on_concluded(self, trial: CameraTrial) -> None:
+    def _on_concluded(self, camera: CalibratedCamera) -> None:
         names = self._workbench.selection.preparation.names
-        self._workbench.archive_writer.keep_camera_trial(trial, names)
+        self._workbench.archive_writer.keep_camera_calibration(camera, names)

@@ -23,7 +23,7 @@ from lightpen.record.folder import (
     CAMERA_CALIBRATIONS,
     TOUCHES,
     VERIFICATIONS,
-    read_camera_trial,
+    read_camera_calibration,
     read_verification,
 )
 from lightpen.record.library.entered_files import numbered_files
@@ -276,15 +276,14 @@ def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:
 
 
 def _of_camera(file: Path, content: bytes, place: FileHash) -> Event:
-    trial = read_camera_trial(content, file)
+    camera = read_camera_calibration(content, file)
     return Event(
         kind=Kind.CAMERA,
-        at=trial.created,
-        names=Names(station=trial.station, operator=trial.operator),
-        program=str(trial.program),
-        origin=trial.origin,
-        outcome=trial.outcome,
-        settings={"board": trial.board, "camera": trial.serial},
+        at=camera.created,
+        names=Names(station=camera.station, operator=camera.operator),
+        program=str(camera.program),
+        origin=camera.origin,
+        settings={"board": camera.board, "camera": camera.serial},
         result=place,
         record_sha256=place.sha256,
     )

@@ -41,7 +41,7 @@ from lightpen.record.swings.writing import is_locked
 
 
 class TrialOutcome(StrEnum):
-    """Outcome of a verification or of the calibration of a camera."""
+    """Outcome of a verification."""
 
     ACCEPTED = "accepted"
     REFUSED = "refused"  # solved, but not used
@@ -53,24 +53,22 @@ CAMERA_CALIBRATION = message("file.camera-calibration")
 
 
 @dataclass(frozen=True, eq=False)
-class CameraTrial:
-    """An attempt to calibrate a camera by a board."""
+class CalibratedCamera:
+    """A calibration of a camera by a board, whose file is in use."""
 
-    outcome: TrialOutcome
     board: str
     serial: str  # empty for images from a folder
     origin: Origin | None
     images: Mapping[str, str]  # SHA-256 of file or pixels by name
-    found: Mapping[str, Any] | None = None  # the result, plain; None if abandoned
-    camera_file: InputFile | None = None  # None if not accepted
+    found: Mapping[str, Any]  # the result, plain
+    camera_file: InputFile
 
 
-class StoredTrial(Struct, frozen=True):
-    """Content of the file of an attempt, without the result."""
+class EnteredCamera(Struct, frozen=True):
+    """Content of the file of a camera calibration, without the result."""
 
     program: ProgramName
     created: ZonedTime
-    outcome: TrialOutcome
     station: str
     operator: str
     board: str
@@ -81,30 +79,29 @@ class StoredTrial(Struct, frozen=True):
         require_usual(self.created)
 
 
-def keep_camera_trial(
-    data: Path, trial: CameraTrial, names: Names, now: datetime
+def keep_camera_calibration(
+    data: Path, camera: CalibratedCamera, names: Names, now: datetime
 ) -> Path:
     """Write the file of a camera calibration and return it."""
-    file = trial.camera_file
+    file = camera.camera_file
     record = {
         **record_heading(now),
-        "outcome": trial.outcome.value,
         "station": names.station,
         "operator": names.operator,
-        "board": trial.board,
-        "serial": trial.serial,
-        "origin": trial.origin,
-        "camera_file": None if file is None else _entry(file.path.name, file.sha256),
-        "calibration": trial.found,
-        "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
+        "board": camera.board,
+        "serial": camera.serial,
+        "origin": camera.origin,
+        "camera_file": _entry(file.path.name, file.sha256),
+        "calibration": camera.found,
+        "inputs": {"images": [_entry(*image) for image in camera.images.items()]},
     }
     return add_numbered(data, data / CAMERA_CALIBRATIONS, record_bytes(record))
 
 
-def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
-    """Read the file of an attempt."""
+def read_camera_calibration(content: bytes, file: Path) -> EnteredCamera:
+    """Read the file of a camera calibration."""
     try:
-        return parse_checked(content, StoredTrial)
+        return parse_checked(content, EnteredCamera)
     except DamagedError as error:
         raise FileError("camera-calibration.damaged", file=file) from error
 

@@ -24,9 +24,9 @@ from lightpen.model.names import Origin
 from lightpen.record.folder import (
     CONCLUSION,
     VERIFICATIONS,
-    CameraTrial,
+    CalibratedCamera,
     TrialOutcome,
-    keep_camera_trial,
+    keep_camera_calibration,
     keep_verification,
 )
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
@@ -133,20 +133,19 @@ def test_a_verification_of_a_simulated_pen_is_entered_as_practice(
     assert event.is_simulated
 
 
-@pytest.mark.parametrize("outcome", TrialOutcome)
-def test_the_calibration_of_a_camera_is_entered_whatever_became_of_it(
-    tmp_path: Path, logbook: Logbook, outcome: TrialOutcome
+def test_the_calibration_of_a_camera_is_entered(
+    tmp_path: Path, logbook: Logbook
 ) -> None:
-    file = InputFile(Path("camera.yaml"), HASH)
-    trial = CameraTrial(
-        *(outcome, "chessboard:7x5:20", "21538392", Origin.LIVE),
+    camera = CalibratedCamera(
+        *("chessboard:7x5:20", "21538392", Origin.LIVE),
         images={"1": HASH},
-        camera_file=file if outcome is TrialOutcome.ACCEPTED else None,
+        found={},
+        camera_file=InputFile(Path("camera.yaml"), HASH),
     )
-    keep_camera_trial(tmp_path, trial, NAMES, NOON)
+    keep_camera_calibration(tmp_path, camera, NAMES, NOON)
 
     (event,) = events(logbook)
-    assert (event.kind, event.outcome, event.at) == (Kind.CAMERA, outcome, NOON)
+    assert (event.kind, event.at) == (Kind.CAMERA, NOON)
     assert event.settings == {"board": "chessboard:7x5:20", "camera": "21538392"}
     assert (event.names.station, event.names.operator) == ("Hall 2", "Ann")
     written = tuple(entries_of(logbook.database, logbook.chain))

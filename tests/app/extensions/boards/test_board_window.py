@@ -21,7 +21,7 @@ from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
 from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
-from lightpen.record.folder import CAMERA_CALIBRATIONS, CameraTrial, TrialOutcome
+from lightpen.record.folder import CAMERA_CALIBRATIONS, CalibratedCamera
 from lightpen_app.look.figures import pooled
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.state_banner import SignLabel
@@ -224,18 +224,18 @@ def test_another_board_held_before_the_camera_is_named(
 
 
 @pytest.mark.slow
-def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
+def test_a_calibration_in_use_is_kept_with_the_hash_of_each_image(
     window: BoardWindow,
     images: list[Image],
     workbench: Workbench,
     tmp_path: Path,
     qtbot: QtBot,
 ) -> None:
-    reported: list[CameraTrial] = []
+    reported: list[CalibratedCamera] = []
     window.concluded.connect(reported.append)
     names = workbench.selection.preparation.names
     window.concluded.connect(
-        lambda trial: workbench.archive_writer.keep_camera_trial(trial, names)
+        lambda camera: workbench.archive_writer.keep_camera_calibration(camera, names)
     )
     folder = written(tmp_path, images)
     (progress,) = window.findChildren(JobProgress)
@@ -247,15 +247,12 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
         window.save(tmp_path / "camera.yaml")
     window.close()
 
-    assert [each.outcome for each in reported] == [
-        TrialOutcome.REFUSED,
-        TrialOutcome.ACCEPTED,
-    ]
+    (camera,) = reported
     first = sha256((tmp_path / "0.png").read_bytes()).hexdigest()
-    assert reported[1].images["0.png"] == first
+    assert camera.images["0.png"] == first
     kept = workbench.folder / CAMERA_CALIBRATIONS
-    qtbot.waitUntil(lambda: kept.is_dir() and len(list(kept.glob("*.json"))) == 2)
-    record = json.loads((kept / "000002.json").read_bytes())
+    qtbot.waitUntil(lambda: kept.is_dir() and bool(list(kept.glob("*.json"))))
+    record = json.loads((kept / "000001.json").read_bytes())
     assert record["camera_file"]["file"] == "camera.yaml"
     assert record["calibration"]["board"] == BOARD
     assert len(record["inputs"]["images"]) == 7
@@ -268,50 +265,24 @@ def slow_disk(hold_back: "HoldBack") -> Event:
 
 
 @pytest.mark.slow
-def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
+def test_a_camera_file_that_is_still_being_saved_is_kept_though_the_window_is_closed(
     window: BoardWindow,
     images: list[Image],
     tmp_path: Path,
     qtbot: QtBot,
     slow_disk: Event,
 ) -> None:
-    reported: list[CameraTrial] = []
+    reported: list[CalibratedCamera] = []
     window.concluded.connect(reported.append)
-    folder = written(tmp_path, images)
-    for path, outcome in (
-        (tmp_path / "camera.yaml", TrialOutcome.ACCEPTED),
-        (tmp_path / "not there" / "camera.yaml", TrialOutcome.REFUSED),
-    ):
-        slow_disk.clear()
-        window.show()
-        window.read_folder(folder)
-        qtbot.waitUntil(lambda: views_listed(window) == 7)
-        window.save(path)
-        window.close()
-        assert reported == []
-        slow_disk.set()
-        qtbot.waitUntil(lambda: reported != [])
-
-        trial = reported.pop()
-        assert trial.outcome is outcome
-        assert trial.found is not None
-        assert len(trial.images) == 7
-
-
-def test_views_that_were_kept_and_never_computed_are_abandoned(
-    window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
-) -> None:
-    reported: list[CameraTrial] = []
-    window.concluded.connect(reported.append)
-    press(window, "Start")
-    for count in range(1, 4):
-        workbench.live.image_shown.emit(_shown(images[0], count))
-        qtbot.waitUntil(lambda: not window.is_searching)
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
+    window.save(tmp_path / "camera.yaml")
     window.close()
+    assert reported == []
+    slow_disk.set()
+    qtbot.waitUntil(lambda: reported != [])
 
-    (trial,) = reported
-    pixels = sha256(images[0].tobytes()).hexdigest()
-    assert (trial.outcome, trial.images) == (TrialOutcome.ABANDONED, {"1": pixels})
+    assert len(reported[0].images) == 7
 
 
 def _shown(image: Image, seconds: int) -> DisplayedImage:
@@ -371,7 +342,7 @@ def test_a_calibration_that_is_cancelled_leaves_the_one_before(
     qtbot: QtBot,
     hold_back: "HoldBack",
 ) -> None:
-    reported: list[CameraTrial] = []
+    reported: list[CalibratedCamera] = []
     window.concluded.connect(reported.append)
     folder = written(tmp_path, images)
     window.read_folder(folder)
