@@ -13,7 +13,6 @@ from contextlib import suppress
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any, NoReturn
 
 import cv2
@@ -36,13 +35,32 @@ from lightpen.extension import Extension, Subcommand
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
 from lightpen.messages import Message
 
-# Name, module that adds the options, imported only for what was given, and purpose.
 COMMANDS = (
-    ("calibrate", "calibrate", "calibrate the tip from the images of a swing"),
-    ("pivot", "pivot", "calibrate the tip from given poses"),
-    ("pen", "pen", "transform measured LED coordinates into the pen frame"),
-    ("repeatability", "repeatability", "compare calibrations of one tip"),
-    ("recalculate", "recalculate", "recompute calibrations and check U by Monte Carlo"),
+    Subcommand(
+        "calibrate",
+        "calibrate the tip from the images of a swing",
+        "lightpen.commands.calibrate:add_calibrate",
+    ),
+    Subcommand(
+        "pivot",
+        "calibrate the tip from given poses",
+        "lightpen.commands.pivot:add_pivot",
+    ),
+    Subcommand(
+        "pen",
+        "transform measured LED coordinates into the pen frame",
+        "lightpen.commands.pen:add_pen",
+    ),
+    Subcommand(
+        "repeatability",
+        "compare calibrations of one tip",
+        "lightpen.commands.repeatability:add_repeatability",
+    ),
+    Subcommand(
+        "recalculate",
+        "recompute calibrations and check U by Monte Carlo",
+        "lightpen.commands.recalculate:add_recalculate",
+    ),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -185,7 +203,7 @@ def _parser(
         add_desktop(parser, desktop)
         add_open(added("open", "open a recorded swing"), desktop)
         add_report(added("report", "write the calibration report as PDF"), desktop)
-    for each in (*map(_own, COMMANDS), *(c for e in extensions for c in e.commands)):
+    for each in (*COMMANDS, *(c for e in extensions for c in e.commands)):
         command = added(each.name, each.purpose)
         command.set_defaults(log_folder=usual_data_folder)
         if each.name in given:
@@ -204,17 +222,6 @@ def _parser(
         if name in given:
             add_options(command, data_folder)
     return parser, commands.choices
-
-
-def _own(entry: tuple[str, str, str]) -> Subcommand:
-    """Return a command of the calibration."""
-    name, module, purpose = entry
-
-    def add_options(parser: argparse.ArgumentParser) -> None:
-        add = f"add_{name.replace('-', '_')}"
-        resolve_name(f"lightpen.commands.{module}:{add}")(parser)
-
-    return Subcommand(name, purpose, add_options)
 
 
 def _names_file(given: Sequence[str], commands: Collection[str]) -> bool:

@@ -3,6 +3,7 @@
 from argparse import ArgumentParser, _SubParsersAction
 from collections.abc import Callable
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
@@ -19,8 +20,11 @@ class Subcommand:
 
     name: str
     purpose: str  # a few words for the list of commands
-    # Adds the options and ``run``; called, and what it needs imported, only when given.
-    add_options: Callable[[ArgumentParser], None]
+    function: str  # "module:name" of what adds the options and ``run``
+
+    def add_options(self, parser: ArgumentParser) -> None:
+        """Add the options and ``run``; what they need is imported only now."""
+        resolve_name(self.function)(parser)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.part_files import folder_locked, part_of, renamed, sweep_parts
+from lightpen.formats.part_files import part_of, renamed, sweep_parts
 from lightpen.messages import Message, message, printable
 
 _WORDED = {  # as the C library words them
@@ -41,7 +41,6 @@ MEGABYTE = 1_000_000  # bytes
 LARGEST_RECORD = 32 * MEGABYTE  # of the own files; 5000 images of 4 cameras take 26
 A_FILE = message("file.file")  # of unknown kind
 FOLDER = message("file.folder")
-PATIENCE = 2.0  # s to wait for another program's rename
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a message
 
 _DEVICES = r"(?i:con|prn|aux|nul|com[0-9\u00b9\u00b2\u00b3]|lpt[0-9\u00b9\u00b2\u00b3])"
@@ -299,14 +298,8 @@ def _name_anew(part: Path, target: Path) -> None:
     except OSError as error:
         if error.errno not in _NO_LINKS:
             raise
-        _rename_anew(part, target)
-
-
-def _rename_anew(part: Path, target: Path) -> None:
-    """Rename a file unless the target exists, on file systems without hard links."""
-    with folder_locked(target.parent, PATIENCE):
-        if target.exists():
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+        if target.exists():  # on a file system without hard links
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
         part.rename(target)
 
 

@@ -1,8 +1,6 @@
 """Temporary files for atomic writes, and their clean-up.
 
-A part is locked as long as it is written, so that one whose lock can be had was left
-behind by a program that was killed. Windows cannot rename open files, and some disks
-support no locks: there a leftover is recognised by its age.
+A part that a program left behind when it was killed is recognised by its age.
 """
 
 import contextlib
@@ -15,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import IO
 
 # Locks of the operating system on open files.
 #
@@ -103,23 +100,21 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_UN)
 
 
-PATIENCE = 2.0  # s to wait for a clean-up in another process
-LONGEST_WRITE = 60.0  # s, after which a part that cannot be locked is taken as left
+PATIENCE = 2.0  # s to wait for a scanner of viruses
+LONGEST_WRITE = 600.0  # s, after which a part was left behind
 _NAME = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
 @contextlib.contextmanager
 def part_of(target: Path, data: bytes, mode: int = 0o666) -> Iterator[Path]:
     """Write data to a temporary file beside its target, of a mode as of `os.open`."""
-    part, stream = _own_part(target.parent, mode)
+    part = target.parent / f".{os.urandom(8).hex()}.part"
     try:
-        with stream:
+        with open(part, "xb", opener=partial(os.open, mode=mode)) as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
-            if os.name != "posix":
-                stream.close()
-            yield part
+        yield part
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
@@ -151,25 +146,6 @@ def sweep_parts(folder: Path) -> None:
                 _sweep(path)
 
 
-def _own_part(folder: Path, mode: int) -> tuple[Path, IO[bytes]]:
-    """Create a temporary file that no clean-up removes."""
-    while True:
-        part = folder / f".{os.urandom(8).hex()}.part"
-        stream = open(part, "xb", opener=partial(os.open, mode=mode))  # noqa: SIM115
-        try:
-            # A clean-up may have run between creation and lock.
-            if locked(stream.fileno(), patience_s=PATIENCE) and part.exists():
-                return part, stream
-        except OSError:  # a disk without locks
-            return part, stream
-        stream.close()
-
-
 def _sweep(part: Path) -> None:
-    if os.name == "posix":
-        with part.open("rb") as stream, contextlib.suppress(OSError):  # without locks
-            if locked(stream.fileno()):
-                part.unlink()  # no other process can lock it meanwhile
-            return
     if time.time() - part.stat().st_mtime > LONGEST_WRITE:
         part.unlink()

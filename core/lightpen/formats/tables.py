@@ -18,8 +18,6 @@ from lightpen.formats.files import quoted, read_text
 from lightpen.messages import Message, message, printable
 
 MAX_LINES = 300_000  # 0.2 GB while they are read
-MAX_LINE_LENGTH = 10_000  # characters
-MAX_CELL_LENGTH = 500  # characters
 MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of LED numbers
 LARGEST_MOMENT = 2**63 - 1  # of frame numbers: nanoseconds have 19 digits
@@ -38,16 +36,6 @@ _IN_BRACKETS = r"\s*[\[(].*[\])]$"  # a unit
 _LED_NAME = r"(?a)^[^\W\d_].*?(?=\d+$)"
 _FRAME_NAME = r"(?a)[^\W\d].*?(\d+)(\.[a-z]+)?"
 _DATE = r"(?a)\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?"
-_BLANK = message("look-alike.blank")
-_LOOK_ALIKES = {
-    **{letter: message("look-alike.letter", letter=letter) for letter in "OolISB"},
-    "\N{MINUS SIGN}": message("look-alike.minus"),
-    "\N{EN DASH}": message("look-alike.dash"),
-    "_": message("look-alike.underscore"),
-    " ": _BLANK,
-    "\N{NO-BREAK SPACE}": _BLANK,
-}
-_CUT_SHORT_ROWS = 20  # fewer rows are typed by hand and may end in a shorter number
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,10 +223,7 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         header = _header_in_comment(text, separator, len(rows[0]))
     if not rows:
         raise FileError("table.only-header", name=name)
-    table = Table(name, header, rows, numbers)
-    if not text.endswith("\n") and not is_foreign:
-        _check_last_number(table)
-    return table
+    return Table(name, header, rows, numbers)
 
 
 def _n_titles(rows: list[list[str]]) -> int:
@@ -279,9 +264,6 @@ def number_flaw(text: str) -> Message | None:
         return message("number.missing")
     if re.fullmatch(_NOT_FINITE, text):
         return message("number.not-finite", cell=quoted(text))
-    for character, meaning in _LOOK_ALIKES.items():
-        if character in text and any(map(str.isdigit, text)):
-            return message("number.look-alike", cell=quoted(text), meaning=meaning)
     return message("number.none", cell=quoted(text))
 
 
@@ -317,11 +299,6 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     ]
     if not lines:
         raise FileError("table.only-comments", name=name)
-    for number, line in lines:
-        if len(line) > MAX_LINE_LENGTH:
-            raise FileError(
-                "table.long-line", line=number, name=name, n_characters=len(line)
-            )
     return lines
 
 
@@ -353,7 +330,7 @@ def _cells(line: str, separator: str | None, number: int, name: str) -> list[str
 def _check_cells(
     lines: list[tuple[int, str]], separator: str | None, name: str
 ) -> None:
-    """Refuse too many or too long cells before allocating memory."""
+    """Refuse too many cells before allocating memory."""
     if separator is None:
         n_cells = sum(len(line.split()) for _, line in lines)
     else:
@@ -362,18 +339,6 @@ def _check_cells(
         raise FileError(
             "table.too-many-cells", name=name, n_cells=n_cells, most=MAX_CELLS
         )
-    for number, line in lines:
-        if len(line) <= MAX_CELL_LENGTH:
-            continue
-        longest = max(len(cell.strip()) for cell in line.split(separator))
-        if longest > MAX_CELL_LENGTH:
-            raise FileError(
-                "table.long-cell",
-                line=number,
-                name=name,
-                n_characters=longest,
-                most=MAX_CELL_LENGTH,
-            )
 
 
 def _looks_numeric(cell: str) -> bool:
@@ -411,23 +376,6 @@ def _check_header(header: tuple[str, ...], number: int, name: str) -> None:
                 "table.column-twice", line=number, name=name, column=quoted(column)
             )
         seen.add(column)
-
-
-def _check_last_number(table: Table) -> None:
-    """Refuse a file truncated within its last number."""
-    if len(table.rows) < _CUT_SHORT_ROWS:
-        return
-    decimals = [len(row[-1].partition(".")[2]) for row in table.rows]
-    if len(set(decimals[:-1])) == 1 and decimals[-1] < decimals[0]:
-        raise table.error(
-            len(table.rows) - 1,
-            message(
-                "table.cut-short",
-                number=quoted(table.rows[-1][-1]),
-                n_decimals=decimals[-1],
-                n_others=decimals[0],
-            ),
-        )
 
 
 # CSV tables without formulas for spreadsheets [1]_.

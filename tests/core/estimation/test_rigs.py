@@ -232,60 +232,31 @@ def test_a_camera_that_was_turned_is_found_by_its_turn() -> None:
     assert denied.estimated == pytest.approx(-np.degrees(0.003), abs=0.01)
 
 
-def transposed(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(R.T, t)
-
-
-def inverted(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(R.T, -R.T @ t)
-
-
-def position(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(R, -R.T @ t)
-
-
-def in_metres(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(R, t / 1000)
-
-
-def of_others(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(rotation_from_vector(np.array([0.0, 0.3, 0.0])) @ R, t)
-
-
 @pytest.mark.parametrize(
-    ("mistake", "words"),
+    "placed_wrong",
     [
-        (transposed, "its rotations are transposed"),
-        (inverted, "it contains rig_from_cam"),
-        (position, "the camera positions in the rig"),
-        (in_metres, "its lengths are in metres"),
-        (of_others, "the file matches the current camera positions"),
+        lambda R, t: (R.T, t),
+        lambda R, t: (R.T, -R.T @ t),
+        lambda R, t: (R, -R.T @ t),
+        lambda R, t: (R, t / 1000),
+        lambda R, t: (rotation_from_vector(np.array([0.0, 0.3, 0.0])) @ R, t),
     ],
+    ids=["transposed", "inverted", "position", "in metres", "of others"],
 )
-def test_a_rig_file_in_another_convention_is_refused_by_name(
-    mistake: Callable[[FloatArray, FloatArray], Rig], words: str
+def test_a_rig_file_in_another_convention_is_refused(
+    placed_wrong: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
 ) -> None:
-    said = refusal(SEEN, mistake(RIG.rotations[1], RIG.translations[1]))
+    said = refusal(SEEN, placed(*placed_wrong(RIG.rotations[1], RIG.translations[1])))
 
     assert said.startswith("The pose of camera right in the rig file")
-    assert words in said
+    assert "cam_from_rig in millimetres" in said
 
 
-def test_exchanged_images_are_named_beside_an_inverted_file() -> None:
-    assert "if the images of two cameras are swapped" in refusal(SEEN[:, ::-1])
-
-
-@pytest.mark.parametrize(
-    ("shift", "words"),
-    [(1, "its image 2 matches image 1"), (-2, "its image 1 matches image 3")],
-)
-def test_images_paired_with_those_of_other_moments_are_reported(
-    shift: int, words: str
-) -> None:
+def test_images_paired_with_those_of_other_moments_are_reported() -> None:
     pixels = SEEN.copy()
-    pixels[:, 1] = np.roll(pixels[:, 1], shift, axis=0)
+    pixels[:, 1] = np.roll(pixels[:, 1], 1, axis=0)
 
-    assert words in refusal(pixels)
+    assert "another rotation of the pen" in refusal(pixels)
 
 
 def test_images_of_another_swing_are_refused() -> None:

@@ -125,7 +125,7 @@ def test_times_are_frames(tmp_path: Path) -> None:
         ),
         ((HEADER, "1,4,2,3"), "Line 2 of obs.csv: there is no LED 4; the pen has LEDs"),
         ((HEADER, "1,0,2,3"), "there is no LED 0"),
-        ((HEADER, "1,1,2,3", "1,2,2,3O"), "Line 3 of obs.csv: .* (letter O)"),
+        ((HEADER, "1,1,2,3", "1,2,2,3O"), "Line 3 of obs.csv: .* is not a number"),
         ((HEADER, "1,1,2,3", "1,2,2"), "Line 3 of obs.csv has 3 cells"),
         ((HEADER, "1,1,2,3", "1,2,"), "Line 3 of obs.csv has 3 cells"),
         ((HEADER, "1,1,1e7,3"), "Line 2 of obs.csv: (1e+07, 3) px lies outside"),

@@ -39,24 +39,6 @@ def along_x(values: npt.ArrayLike) -> FloatArray:
     return np.outer(np.asarray(values, dtype=np.float64), [1.0, 0.0, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("shift", "places"),
-    [(2, [-1, -1, 0, 1, 2]), (-2, [2, 3, 4, -1, -1]), (0, range(5))],
-)
-def test_what_is_shifted_beyond_the_end_is_not_known(
-    shift: int, places: list[int]
-) -> None:
-    seen = of_vectors(random_vectors(5, 1.0))
-    seen = PenRotations(seen.rotations, np.arange(5.0), seen.known)
-    moved = seen.shifted(shift)
-
-    known = np.array(places) >= 0
-    np.testing.assert_array_equal(moved.known, known)
-    from_places = np.array(places)[known]
-    np.testing.assert_array_equal(moved.variances[known], from_places)
-    np.testing.assert_array_equal(moved.rotations[known], seen.rotations[from_places])
-
-
 def test_what_one_camera_missed_the_other_completes() -> None:
     pen = rotation_from_vector(random_vectors(3, 1.0))
     one = PenRotations(pen, np.full(3, 1.0), np.array([True, False, False]))
@@ -214,41 +196,3 @@ def test_a_quarter_of_the_moments_may_be_apart(n_apart: int, passes: bool) -> No
             "code": "rig.other-moments", "camera": "right", "n_apart": n_apart,
             "n_pairs": 40,
         }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("shift", "own", "others"),
-    [(1, 1, 2), (-3, 4, 1), (10, 1, 11), (-10, 11, 1), (11, 0, 0)],
-)
-def test_an_order_that_is_off_by_up_to_ten_moments_is_named(
-    shift: int, own: int, others: int
-) -> None:
-    """The first of one camera goes with a later one of the other."""
-    pen = random_vectors(60, 0.5)
-    one, other = pen[max(shift, 0) :][:40], pen[max(-shift, 0) :][:40]
-    noise = rotation_from_vector(random_vectors(40, 0.001, 1))
-    seen = PenRotations(
-        noise @ rotation_from_vector(one), np.full(40, 1e-6), np.ones(40, bool)
-    )
-
-    found = refused(of_vectors(other, 1e-6), seen)
-    if own:
-        named = {"camera": "right", "own": own, "others": others}
-        assert found == {"code": "rig.other-order", **named}
-    else:
-        assert found["code"] == "rig.other-moments"
-
-
-@pytest.mark.parametrize(("left", "is_named"), [(0.25, True), (0.35, False)])
-def test_another_order_must_explain_most_of_the_scatter(
-    left: float, is_named: bool
-) -> None:
-    pen = random_vectors(40, 0.2)
-    noise = random_vectors(40, 1.0, 1)
-    one, other = of_vectors(pen, 1e-8), of_vectors(np.roll(pen, 1, axis=0), 1e-8)
-    size = left * relative_turn(one, other).scatter
-    noise *= size / np.linalg.norm(noise, axis=1, keepdims=True)
-    seen = rotation_from_vector(noise) @ other.rotations
-
-    code = refused(one, PenRotations(seen, other.variances, other.known))["code"]
-    assert code == ("rig.other-order" if is_named else "rig.other-moments")
