@@ -5800,10 +5800,6 @@ needed</source>
         <translation>磁盘是只读的。请选择其他文件夹。</translation>
     </message>
     <message>
-        <source>The file agrees with the images if it contains rig_from_cam, or if the images of two cameras are swapped. Give the images in the order of the cameras in the file; cam_from_rig is needed: for each camera transpose the rotation R and replace the translation t by -R^T t.</source>
-        <translation>若该文件给出的是 rig_from_cam，或两台相机的图像互换，则与图像一致。请按文件中相机的顺序给出图像；此处需要 cam_from_rig：请将每台相机的旋转 R 转置，并用 -R^T t 代替平移 t。</translation>
-    </message>
-    <message>
         <source>The file has {n_leds} LEDs.</source>
         <translation>文件有 {n_leds} 个 LED。</translation>
     </message>
@@ -6096,10 +6092,6 @@ needed</source>
         <translation>{name} 中的第 {number} 台相机</translation>
     </message>
     <message>
-        <source>centimetres</source>
-        <translation>厘米</translation>
-    </message>
-    <message>
         <source>diameter of the discs</source>
         <translation>发光面的直径</translation>
     </message>
@@ -6110,18 +6102,6 @@ needed</source>
     <message>
         <source>fx {fx:.1f}, cx {cx:.1f}, cy {cy:.1f} px in {n_views} views ({names})</source>
         <translation>{n_views} 个视图（{names}）中 fx {fx:.1f}、cx {cx:.1f}、cy {cy:.1f} px</translation>
-    </message>
-    <message>
-        <source>inches</source>
-        <translation>英寸</translation>
-    </message>
-    <message>
-        <source>metres</source>
-        <translation>米</translation>
-    </message>
-    <message>
-        <source>micrometres</source>
-        <translation>微米</translation>
     </message>
     <message>
         <source>mostly at the lower left of the pen&apos;s region in the image</source>
@@ -6652,14 +6632,6 @@ needed</source>
         <translation>需要数字的单元格为空。</translation>
     </message>
     <message>
-        <source>a dash in place of a minus sign</source>
-        <translation>用破折号代替减号</translation>
-    </message>
-    <message>
-        <source>a typographic minus sign</source>
-        <translation>排版用减号</translation>
-    </message>
-    <message>
         <source>ambiguous</source>
         <translation>有歧义</translation>
     </message>
@@ -6674,10 +6646,6 @@ needed</source>
     <message>
         <source>away to the right</source>
         <translation>远离相机偏右</translation>
-    </message>
-    <message>
-        <source>blank inside</source>
-        <translation>中间有空格</translation>
     </message>
     <message>
         <source>blurred</source>
@@ -6734,10 +6702,6 @@ needed</source>
     <message>
         <source>leds in {name} is no list of LEDs. Write it as [{{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}, ...].</source>
         <translation>{name} 中的 leds 不是 LED 列表。请写成 [{{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}, ...]。</translation>
-    </message>
-    <message>
-        <source>letter {letter}</source>
-        <translation>字母 {letter}</translation>
     </message>
     <message>
         <source>no LED seen</source>
@@ -6820,10 +6784,6 @@ needed</source>
         <translation>球（直径）</translation>
     </message>
     <message>
-        <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
-        <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
-    </message>
-    <message>
         <source>the lens, beyond its distortion model, and the systematic error of the LED centres. Calibrate the camera with views that fill the image, so that its file states the lens field, focus the lens, and illuminate the LEDs evenly</source>
         <translation>镜头超出畸变模型的部分以及 LED 中心的系统误差。请以布满图像的视图标定相机，使其文件给出镜头残余场；对焦镜头，并使 LED 发光均匀</translation>
     </message>
@@ -6884,10 +6844,6 @@ needed</source>
         <translation>cam_from_rig 沿 {axis} 轴的平移</translation>
     </message>
     <message>
-        <source>underscore</source>
-        <translation>下划线</translation>
-    </message>
-    <message>
         <source>unreadable</source>
         <translation>无法读取</translation>
     </message>
@@ -6902,10 +6858,6 @@ needed</source>
     <message>
         <source>{cell} is not a finite number.</source>
         <translation>{cell} 不是有限数。</translation>
-    </message>
-    <message>
-        <source>{cell} is not a number ({meaning}).</source>
-        <translation>{cell} 不是数字（{meaning}）。</translation>
     </message>
     <message>
         <source>{cell} is not a number.</source>
@@ -6926,10 +6878,6 @@ needed</source>
     <message>
         <source>{count} numbers</source>
         <translation>{count} 个数</translation>
-    </message>
-    <message>
-        <source>{direction} Its lengths seem to be in {unit}; millimetres are needed.</source>
-        <translation>{direction}其长度单位似乎是{unit}；此处需要毫米。</translation>
     </message>
     <message>
         <source>{entry} in {name} cannot be read: {flaw} Correct it, or export the file again.</source>
@@ -7364,10 +7312,6 @@ needed</source>
         <translation>{name} 第 {line} 行开始一个文档类型定义，出于安全原因不予接受。请删除；OpenCV 的内参文件中没有这种定义。</translation>
     </message>
     <message>
-        <source>Line {line} of {name} has a cell of {n_characters} characters; the maximum is {most}. Check that this is the right file.</source>
-        <translation>{name} 第 {line} 行有一个长达 {n_characters} 个字符的单元格；最多读取 {most} 个。请检查文件是否选对。</translation>
-    </message>
-    <message>
         <source>Line {line} of {name} has a list in place of a name. Check that this is the right file.</source>
         <translation>{name} 第 {line} 行应为名称的地方是列表。请检查是否选对了文件。</translation>
     </message>
@@ -7378,10 +7322,6 @@ needed</source>
     <message>
         <source>Line {line} of {name} has the tag {tag}. For security only plain values and OpenCV matrices are read. Remove the tag, or use a file from a source you trust.</source>
         <translation>{name} 第 {line} 行有标签 {tag}。出于安全原因，只读取普通数值和 OpenCV 矩阵。请删除该标签，或使用来源可信的文件。</translation>
-    </message>
-    <message>
-        <source>Line {line} of {name} has {n_characters} characters, too many for a table row. Check that this is the right file.</source>
-        <translation>{name} 第 {line} 行有 {n_characters} 个字符，表格的行不会这么长。请检查是否选对了文件。</translation>
     </message>
     <message>
         <source>Line {line} of {name}: duplicate column {column} in the header. Give each column a unique name.</source>
@@ -7868,18 +7808,6 @@ needed</source>
         <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请触测缺少的点。</translation>
     </message>
     <message>
-        <source>The file agrees with the images if it contains the camera positions in the rig instead of the translations of cam_from_rig. Replace c by -R c.</source>
-        <translation>若该文件给出的是相机在相机组中的位置，而不是 cam_from_rig 的平移，则与图像一致。请用 -R c 代替 c。</translation>
-    </message>
-    <message>
-        <source>The file agrees with the images if its lengths are in {unit}. Millimetres are needed.</source>
-        <translation>若该文件的长度单位为{unit}，则与图像一致。此处需要毫米。</translation>
-    </message>
-    <message>
-        <source>The file agrees with the images if its rotations are transposed. Write each matrix row by row, for multiplication with a column vector.</source>
-        <translation>若将该文件中的旋转转置，则与图像一致。请按左乘列向量的形式逐行写出旋转矩阵。</translation>
-    </message>
-    <message>
         <source>The file {file} exists already. Give the export another name.</source>
         <translation>文件 {file} 已存在。请为导出另取名称。</translation>
     </message>
@@ -7946,10 +7874,6 @@ needed</source>
     <message>
         <source>The images do not determine the tip yet. Tilt the pen to all sides.</source>
         <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
-    </message>
-    <message>
-        <source>The images of camera {camera} are paired with images of other instants: its image {own} matches image {others} of the other cameras, and so on. Give simultaneous images the same name; some may be missing at the start.</source>
-        <translation>相机 {camera} 的图像与其他时刻的图像配成了对：它的第 {own} 幅图像对应其他相机的第 {others} 幅，依此类推。请让同一时刻的图像同名；开头可能缺少若干图像。</translation>
     </message>
     <message>
         <source>The images of one camera arrived late; recent image pairs are {moved:.0f} ms apart in time. Pairing is correct again. Images that do not agree are excluded from the result. Check them in Review, or repeat the swing.</source>
@@ -8050,10 +7974,6 @@ needed</source>
     <message>
         <source>The points do not match a flat board {board}: its squares differ from the description, or the images are from different cameras. Count and measure the squares again.</source>
         <translation>没有相机会把平整标定板 {board} 看成这些点的样子：格子与所指定的不符，或图像不是同一相机拍摄。请重新数并测量格子。</translation>
-    </message>
-    <message>
-        <source>The pose of camera {camera} in the rig file differs from the images by {angle:.1f}° and {distance:.0f} mm.</source>
-        <translation>相机组文件中相机 {camera} 的位姿与图像相差 {angle:.1f}° 和 {distance:.0f} mm。</translation>
     </message>
     <message>
         <source>The poses have no common tip: the best fit scatters by {scatter:.0f} mm, with the poses {movement:.0f} mm apart. Check that they belong to one pen swung on its tip, that they are cam_from_pen, and that rotations and translations belong together.</source>
@@ -8238,6 +8158,10 @@ needed</source>
     <message>
         <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
         <translation>图像随光笔倾斜平移 {size:.3f} px（均方根）：相机随操作员移动而转动。结果已修正，其余部分计入 U。请将相机置于脚步不会影响的稳固支架上。</translation>
+    </message>
+    <message>
+        <source>The pose of camera {camera} in the rig file differs from the images by {angle:.1f}° and {distance:.0f} mm. Check that the file has cam_from_rig in millimetres (a point p of the first camera is at R p + t), that it matches the current camera positions, and that the images are in the order of its cameras; or calibrate the rig again.</source>
+        <translation>相机 {camera} 在相机组文件中的位姿与图像相差 {angle:.1f}° 和 {distance:.0f} mm。请检查文件给出的是以毫米为单位的 cam_from_rig（第一台相机的点 p 位于 R p + t）、是否与当前相机位置一致，以及图像是否按文件中相机的顺序给出；或重新标定相机组。</translation>
     </message>
     <message>
         <source>The probed points of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
@@ -9050,14 +8974,6 @@ needed</source>
     <message>
         <source>{what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2)</source>
         <translation>{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)</translation>
-    </message>
-    <message>
-        <source>{where} Check that the file matches the current camera positions and that the images are in the order of its cameras, or calibrate the rig again.</source>
-        <translation>{where}请检查该文件是否对应这些相机当前的位置，图像是否按其相机的顺序给出，或重新标定相机组。</translation>
-    </message>
-    <message>
-        <source>{where} {cause}</source>
-        <translation>{where}{cause}</translation>
     </message>
     <message>
         <source>{why}</source>

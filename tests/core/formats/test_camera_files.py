@@ -371,7 +371,7 @@ def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
         ("2448", "wide", 'image_width .* "wide" is not a number'),
         ("4638.1999999999998", ".Nan", r'camera_matrix .* "\.Nan" is not a finite'),
         ("4638.1999999999998", "-.Inf", "is not a finite number"),
-        ("4638.1999999999998", "463O", r"is not a number \(letter O\)"),
+        ("4638.1999999999998", "463O", r"is not a number"),
         ("4638.1999999999998", "-4638", "focal lengths -4638 and 4637.1 px"),
         ("4638.1999999999998", "16.0", "may be in millimetres"),
         ("4638.1999999999998", "2000", "2000 and 4637.1 px along u and v"),

@@ -151,14 +151,6 @@ def test_the_first_led_given_twice_is_named_with_both_lines(tmp_path: Path) -> N
     )
 
 
-def test_a_file_that_ends_within_a_number_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "obs.csv"
-    lines = [f"{n},1,100.12345,200.12345" for n in range(40)]
-    path.write_text("\n".join([HEADER, *lines])[:-3])
-    with pytest.raises(FileError, match=r"^Line 41 .* ends within the number"):
-        read_centers(path, 3)
-
-
 def test_more_frames_than_any_swing_has_are_refused(tmp_path: Path) -> None:
     lines = [f"{n},1,2,3" for n in range(30_001)]
     assert "has 30001 frames; at most 5000" in refusal_of_centers(tmp_path, *lines)
