@@ -36,7 +36,7 @@ def test_every_link_leads_to_a_file_and_to_a_heading(page: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *(name for name, *_ in COMMANDS),
+        *(each.name for each in COMMANDS),
         *(each.name for extension in EXTENSIONS for each in extension.commands),
         *("archive", "tips", "open", "report"),
     ],
