@@ -301,18 +301,14 @@ def require_usual_rig(rig: Rig, placed: InitialExtrinsics) -> None:
 
     Smaller deviations are left to the adjustment.
     """
-    off = placed.deviations(rig).reshape(-1, 6)
-    angles, lengths = (
-        np.linalg.norm(part, axis=1) for part in (off[:, :3], off[:, 3:])
-    )
-    apart = np.linalg.norm(placed.rig.translations[1:], axis=1)
-    shares = lengths / np.maximum(apart, LEAST_DISTANCE)
-    sizes = np.maximum(angles / USUAL_ANGLE, shares / USUAL_SHARE)
-    c = int(np.argmax(sizes))
-    if sizes[c] > 1:
-        raise CalibrationError(
-            "rig.of-others",
-            camera=rig.names[c + 1],
-            angle=float(np.degrees(angles[c])),
-            distance=float(lengths[c]),
-        )
+    for c, off in enumerate(placed.deviations(rig).reshape(-1, 6), 1):
+        angle, distance = (float(np.linalg.norm(part)) for part in (off[:3], off[3:]))
+        apart = float(np.linalg.norm(placed.rig.translations[c]))
+        most = USUAL_SHARE * max(apart, LEAST_DISTANCE)
+        if angle > USUAL_ANGLE or distance > most:
+            raise CalibrationError(
+                "rig.of-others",
+                camera=rig.names[c],
+                angle=float(np.degrees(angle)),
+                distance=distance,
+            )
