@@ -174,7 +174,11 @@ def test_exchanged_folders_of_other_names_are_reported_by_their_images(
     (copied / "left").rename(copied / "b")
     (copied / "right").rename(copied / "a")
 
-    assert_refused(calibrate(lightpen, copied, images=("a", "b")), "images are in the order of its cameras", 1)
+    assert_refused(
+        calibrate(lightpen, copied, images=("a", "b")),
+        "images are in the order of its cameras",
+        1,
+    )
 
 
 def test_images_of_another_size_name_the_camera(copied: Path, lightpen: Run) -> None:
