@@ -80,6 +80,7 @@ MESSAGES = {
     "measuring.concentricity": "concentricity",
     "measuring.characteristic": "{quantity} {of}",
     "measuring.named": "{name}",
+    "measuring.plate-words": "top front hole bore dome countersink pad",
     "measuring.simulated-plate": "Simulated plate",
     "measuring.sided": "{kind}, {side}",
     "measuring.sided-by": "{kind}, {side} ({by})",

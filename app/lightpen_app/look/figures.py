@@ -107,11 +107,25 @@ def paint_budget(
     texts = list(map(_value_text, figure.bars))
     line, gap = metrics.height(), GAP * metrics.height()
     left = area.left() + gap + max(bold.horizontalAdvance(b.name) for b in figure.bars)
-    right = area.right() - gap - max(map(bold.horizontalAdvance, texts))
+    widths = list(map(bold.horizontalAdvance, texts))
     head = 0.0 if figure.limit is None else line
     step = min((area.height() - head) / len(figure.bars), 2 * line)
-    reach = max([bar.value for bar in figure.bars] + [figure.limit or 0.0]) or 1.0
-    scale = max(right - left, 1.0) / reach
+    room = area.right() - left
+    reaches = [(figure.limit or 0.0, room)]
+    for bar, width in zip(figure.bars, widths, strict=True):
+        reaches.append((bar.value, room - gap - width))
+    scale = min((max(px, 1.0) / reach for reach, px in reaches if reach), default=1.0)
+    if figure.limit is not None:
+        x = left + scale * figure.limit
+        painter.setFont(letters)
+        limit = translate("BudgetFigure", "limit {0}").format(mm_text(figure.limit))
+        width = metrics.horizontalAdvance(limit) + 1
+        start = min(max(x - width / 2, area.left()), area.right() - width)
+        painter.setPen(QColor(colors.muted))
+        painter.drawText(QRectF(start, area.top(), width, line), MIDDLE, limit)
+        painter.setPen(QPen(QColor(colors.text), 1.0, Qt.PenStyle.DashLine))
+        bottom = area.top() + head + len(figure.bars) * step
+        painter.drawLine(QPointF(x, area.top() + head), QPointF(x, bottom))
     for i, (bar, text) in enumerate(zip(figure.bars, texts, strict=True)):
         top = area.top() + head + i * step
         is_beyond = i == 0 and figure.limit is not None and bar.value > figure.limit
@@ -126,21 +140,10 @@ def paint_budget(
         painter.setPen(QColor(colors.text))
         name = QRectF(area.left(), top, left - gap - area.left(), step)
         painter.drawText(name, Qt.AlignmentFlag.AlignRight | MIDDLE, bar.name)
-        beside = QRectF(place.right() + gap, top, area.right() - place.right(), step)
+        beside = QRectF(place.right() + gap, top, widths[i], step)
+        painter.fillRect(beside, QColor(colors.panel))  # over the line of the limit
         painter.drawText(beside, Qt.AlignmentFlag.AlignLeft | MIDDLE, text)
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    if figure.limit is None:
-        return
-    x = left + scale * figure.limit
-    painter.setFont(letters)
-    limit = translate("BudgetFigure", "limit {0}").format(mm_text(figure.limit))
-    width = metrics.horizontalAdvance(limit) + 1
-    start = min(max(x - width / 2, area.left()), area.right() - width)
-    painter.setPen(QColor(colors.muted))
-    painter.drawText(QRectF(start, area.top(), width, line), MIDDLE, limit)
-    painter.setPen(QPen(QColor(colors.text), 1.0, Qt.PenStyle.DashLine))
-    bottom = area.top() + head + len(figure.bars) * step
-    painter.drawLine(QPointF(x, area.top() + head), QPointF(x, bottom))
 
 
 def _value_text(bar: BudgetBar) -> str:

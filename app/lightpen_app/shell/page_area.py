@@ -4,17 +4,16 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QCoreApplication, QDeadlineTimer, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QWindow
-from PySide6.QtWidgets import (
-    QBoxLayout,
-    QFrame,
-    QLineEdit,
-    QSizePolicy,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QLineEdit, QSizePolicy, QStackedWidget, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.layouts import announce, fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    announce,
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
 from lightpen_app.look.theme import (
     GRID,
     TextSize,
@@ -104,6 +103,9 @@ class NoticeBar(Translated, QFrame):
         return f"{text} {way}"
 
 
+LONG_LEAD = 120  # letters, from which it has a row of its own
+
+
 class PageArea(QFrame):
     """Shows one page of several.
 
@@ -114,6 +116,7 @@ class PageArea(QFrame):
         super().__init__()
         self.setObjectName("page_area")
         self.last_input = LastInput(self)
+        self._room = SizeClass()
 
         # Widgets: the order of making them is the order of the Tab key
         self.notice = NoticeBar()
@@ -177,18 +180,18 @@ class PageArea(QFrame):
         self._lead.setText(lead)
         set_tone(self._lead, tone)
         self._lead.setVisible(bool(lead))
+        self.set_room(self._room)
 
     def set_room(self, room: SizeClass) -> None:
         """Arrange title, lead and margins as the size of the window allows."""
-        side = room.margin
+        self._room, side = room, room.margin
         if room.is_low:
             self._layout.setContentsMargins(side, 0, side, GRID)
-            self._heading.setDirection(QBoxLayout.Direction.LeftToRight)
-            self._heading.setSpacing(3 * GRID)
         else:
             self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
-            self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
-            self._heading.setSpacing(GRID)
+        is_beside = room.is_low and len(self._lead.text()) < LONG_LEAD
+        self._heading.setSpacing(3 * GRID if is_beside else GRID)
+        set_stacked(self._heading, not is_beside)
 
 
 def focus_first(page: Page) -> bool:

@@ -18,7 +18,7 @@ from lightpen_app.widgets.plots import Plot
 
 DOT, RING = 6, 13  # px
 N_LINES = 3
-LEAST_HEIGHT = 13 * GRID
+LEAST_HEIGHT = 18 * GRID
 
 
 class TrendPlot(Plot):

@@ -23,7 +23,7 @@ from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature, fre
 from lightpen_extensions.measure.measuring.plan_checks import read_plan, write_plan
 from lightpen_extensions.measure.measuring.report import EXPORTS
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
-from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.probing_operator import PLATE_WORDS, plate_plan
 from lightpen_extensions.measure.session import VerificationStatus
 from lightpen_extensions.measure.tasks.part import PART, planned_at
 
@@ -177,7 +177,7 @@ class PlanPanel(Translated, QWidget):
         choose_plan(self._service, None)
 
     def _on_plate_clicked(self) -> None:
-        choose_plan(self._service, plate_plan())
+        choose_plan(self._service, plate_plan(worded(PLATE_WORDS)))
 
     def _on_kind_chosen(self) -> None:
         word = self._kind.currentData()

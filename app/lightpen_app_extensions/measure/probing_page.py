@@ -206,6 +206,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._view = view = self._presenter.view()
         status = self._run.status
         self._progress.set_value(view)
+        self._simulator.set_inviting(not status.is_done)
         self._checks.set_rows(view.rows)
         self._checks.show_row(self._shown_row())
         self._show_row(self._shown_row())

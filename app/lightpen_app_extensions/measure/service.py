@@ -22,14 +22,18 @@ from lightpen_app.face import (
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import GRID, Tone, set_styled
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
 from lightpen_app.steps.simulator_controls import SimulatorControls
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import RunView
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.measure.probing_operator import ProbingOperator, plate_plan
+from lightpen_extensions.measure.probing_operator import (
+    PLATE_WORDS,
+    ProbingOperator,
+    plate_plan,
+)
 from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import (
@@ -207,7 +211,7 @@ class MeasureService(Service):
         self.refused.emit()
 
     def _begin_demo(self) -> None:
-        self.set_choices(replace(self.choices, plan=plate_plan()))
+        self.set_choices(replace(self.choices, plan=plate_plan(worded(PLATE_WORDS))))
 
     def _is_demo_done(self) -> bool:
         if self.measuring.probing_operator is None:  # once it is here
@@ -309,7 +313,6 @@ class ProbingSimulatorControls(SimulatorControls):
             tip=self.tr("Probes all tasks automatically."),
             checkable=True,
         )
-        self._touch.setProperty("inviting", True)
 
         # Layout
         margins = (GRID, GRID // 2, GRID, GRID // 2)
@@ -319,6 +322,10 @@ class ProbingSimulatorControls(SimulatorControls):
         self._touch.toggled.connect(service.set_touching)
 
         self._follow_connection()
+
+    def set_inviting(self, inviting: bool) -> None:
+        """Draw its button filled: one button of a page is, at most."""
+        set_styled(self._touch, "inviting", "true" if inviting else "")
 
     def stop(self) -> None:
         """Release the simulated operator."""

@@ -1,7 +1,9 @@
 """The simulated station: a plate with its plan, and an operator who probes it."""
 
+import re
 from functools import cache
 
+from lightpen.messages import message
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import parse_plan
 from lightpen_extensions.measure.probing.probing import ProbingPhase
@@ -96,7 +98,12 @@ characteristics:
 """
 
 
+PLATE_WORDS = message("measuring.plate-words")  # of the names of its features
+
+
 @cache
-def plate_plan() -> Plan:
-    """Return the measuring plan of the plate."""
-    return parse_plan(PLATE, "plate.yaml")
+def plate_plan(words: str = PLATE_WORDS.template) -> Plan:
+    """Return the measuring plan of the plate, its features named in some language."""
+    named = dict(zip(PLATE_WORDS.template.split(), words.split(), strict=True))
+    text = re.sub(rf"\b({'|'.join(named)})\b", lambda word: named[word[0]], PLATE)
+    return parse_plan(text, "plate.yaml")

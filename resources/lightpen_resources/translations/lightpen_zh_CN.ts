@@ -5256,6 +5256,18 @@ needed</source>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
+        <source>Bending (part of U when measuring): {assumed:.3f} mm assumed; a press test measures it.</source>
+        <translation>弯曲（测量时计入 U）：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
+    </message>
+    <message>
+        <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
+    </message>
+    <message>
+        <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
+    </message>
+    <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
         <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
@@ -6246,6 +6258,10 @@ needed</source>
     <message>
         <source>tip and U for Q-DAS (.dfq)</source>
         <translation>供 Q-DAS 使用的测球中心和 U (.dfq)</translation>
+    </message>
+    <message>
+        <source>top front hole bore dome countersink pad</source>
+        <translation>上面 前面 孔 内孔 球面 锥孔 凸台</translation>
     </message>
     <message>
         <source>x and y of the LED centres are exchanged</source>
@@ -7654,18 +7670,6 @@ needed</source>
     <message>
         <source>An LED file needs one known length. Measure the distance between two LEDs and state it.</source>
         <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距。</translation>
-    </message>
-    <message>
-        <source>Bending: {assumed:.3f} mm assumed; a press test measures it.</source>
-        <translation>弯曲：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
-    </message>
-    <message>
-        <source>Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
-        <translation>弯曲：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
-    </message>
-    <message>
-        <source>Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
-        <translation>弯曲：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
     </message>
     <message>
         <source>Does not verify the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.</source>

@@ -14,6 +14,7 @@ from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Figure
 
 N_COLUMNS = 2  # of a grid
+LEAST_HEIGHT = 25 * GRID  # px, of a plot with its title and axes
 
 
 class NamedPicture(NamedTuple):
@@ -37,6 +38,7 @@ class PlotCard(Translated, QFrame):
         self.plot = plot
         self._file_stem = file_stem
         self.setProperty("area", "panel")
+        plot.setMinimumHeight(LEAST_HEIGHT)
 
         self._is_needed = True
 

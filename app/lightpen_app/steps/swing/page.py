@@ -171,6 +171,7 @@ class SwingPage(Page):
         before = self._shown
         self._shown = now = self._presenter.page_state(is_away=not self._is_shown)
         self._view.set_state(now)
+        self._simulator.set_inviting(now.main.is_early)
         is_other = now.side is not before.side and {now.side, before.side} != PAUSES
         if is_other and self._view.side.hasFocus():
             self._view.dial.setFocus()  # Enter would run an action that was not shown

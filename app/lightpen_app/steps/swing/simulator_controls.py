@@ -6,7 +6,7 @@ from typing_extensions import override
 
 from lightpen.live.sources import Operator
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.theme import GRID, set_styled
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fitting import NO_ROOM, ResponsiveLayout
@@ -29,7 +29,6 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
         # Widgets
         self._follow = PushButton(checkable=True)
-        self._follow.setProperty("inviting", True)
         self._more = self.make_button(
             self.tr("Other movements"),
             tip=self.tr("What else the simulated operator can do with the pen"),
@@ -90,6 +89,10 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         """Let the operator swing, as the button invites to."""
         if self._live.operator is not None and not self.follows():
             self._follow.setChecked(True)
+
+    def set_inviting(self, inviting: bool) -> None:
+        """Draw the button that swings filled: one button of a page is, at most."""
+        set_styled(self._follow, "inviting", "true" if inviting else "")
 
     def follows(self) -> bool:
         """Return whether the operator follows the swing."""

@@ -34,7 +34,7 @@ from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.state_banner import SignLabel, StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 
-DIAL_SHARE, SIDE_SHARE = 2, 3  # of the width
+DIAL_SHARE, SMALL_DIAL_SHARE, SIDE_SHARE = 2, 3, 3  # of the width
 SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
@@ -98,7 +98,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
         self._side.addWidget(self._pen, 0, 1)
         self._body.setRowStretch(0, 1)
-        self._body.setColumnStretch(0, DIAL_SHARE)
         self._body.setColumnStretch(1, SIDE_SHARE)
         self._scroll = PageScroll()
         self._scroll.setWidget(self._content)
@@ -176,6 +175,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
+        share = SMALL_DIAL_SHARE if is_small else DIAL_SHARE
+        self._body.setColumnStretch(0, share)
         self._share_room()
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())

@@ -97,7 +97,10 @@ def test_a_pen_of_unknown_temperature_adds_seven_hundredths_to_a_metre() -> None
 
     assert "adds 0.07 mm per metre" in str(added)
     assert "State both" in str(added)
-    assert str(bending) == "Bending: 0.004 mm assumed; a press test measures it."
+    assert str(bending) == (
+        "Bending (part of U when measuring): 0.004 mm assumed; a press test measures "
+        "it."
+    )
 
 
 def test_a_stated_temperature_corrects_the_pen_and_adds_less() -> None:
