@@ -130,9 +130,15 @@ def test_a_path_that_is_nonsense_is_marked_and_replaces_nothing(
     for field in camera_fields(walker):
         if field.isVisible():
             type_into(field)
+    of_producer = SourceChoice("genicam")
+    selection.set_preparation(selection.preparation.with_source(of_producer))
+    for field in walker.window.page().findChildren(PathField):
+        if field.isVisible() and field.edit.accessibleName() == "GenTL producer":
+            type_into(field)
 
     assert n_typed == {
         "LED file": 1,
+        "GenTL producer": 1,
         "Intrinsics file": 1,
         "Rig file": 1,
         "Folder, record or video": 3,

@@ -109,9 +109,9 @@ def set_stacked(layout: QBoxLayout, stacked: bool) -> None:
     """Arrange the cells from top to bottom, or from left to right."""
     direction = QBoxLayout.Direction
     layout.setDirection(direction.TopToBottom if stacked else direction.LeftToRight)
-    around = layout.parentWidget().layout()
-    if around is not None:
-        around.activate()  # of a hidden page Qt would keep the former width
+    around = layout.parentWidget()
+    if around is not None and (whole := around.layout()) is not None:
+        whole.activate()  # of a hidden page Qt would keep the former width
 
 
 def _attached(

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from msgspec import structs
@@ -25,6 +25,7 @@ from lightpen.record.library.tip_library import (
 )
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.swing.preparation import Preparation, SourceKind
+from lightpen_app.look.words import moment_text
 from lightpen_app.work.job import Job, LatestJob, Notifications, Report
 from lightpen_app.work.selection import Selection
 
@@ -213,12 +214,18 @@ class PenFiles(QObject):
             words = self.tr("{0} is not the LED file stored with pen {1} ({2}).")
             if file.path == Path(own.path):
                 words = self.tr("{0} was changed since it was stored with pen {1}.")
-            is_alike = file.path.name == own.name
-            shown, stored = (
-                (file.path, own.path) if is_alike else (file.path.name, own.name)
-            )
+            shown, stored = file.path.name, own.name
+            if shown == stored:
+                shown, stored = self._dated(file.path), self._dated(Path(own.path))
             return words.format(shown, pen, stored)
         return ""
+
+    def _dated(self, path: Path) -> str:
+        """Return a path with the moment of its last change, if it can be read."""
+        with suppress(OSError):
+            changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
+            return self.tr("{0} of {1}").format(path, moment_text(changed))
+        return str(path)
 
     def keep(self, file: PenFile) -> None:
         """Store a file with the pen that is chosen, unless a supervisor must do it."""

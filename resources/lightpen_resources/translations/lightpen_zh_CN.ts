@@ -2909,6 +2909,10 @@
         <translation>{0} 自随光笔 {1} 保存以来已被更改。</translation>
     </message>
     <message>
+        <source>{0} of {1}</source>
+        <translation>{0}（{1}）</translation>
+    </message>
+    <message>
         <source>LED file</source>
         <translation>LED 文件</translation>
     </message>

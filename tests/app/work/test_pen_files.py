@@ -1,7 +1,9 @@
 """The LED file belongs to the pen: chosen with it, stored with it, asked for."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -118,14 +120,20 @@ def test_another_file_of_the_same_pen_is_doubted_until_it_is_stored(
     assert bench.pens.doubt() == ""
 
 
-def test_files_of_the_same_name_are_told_apart_by_their_folders(bench: Bench) -> None:
+def test_files_of_the_same_name_are_told_apart_by_folder_and_date(bench: Bench) -> None:
     one = bench.file("04.csv")
     bench.open(one)
     (one.path.parent / "old").mkdir()
     other = bench.file("old/04.csv", x=25.1)
+    moment = datetime(2026, 3, 1, 12, 30).timestamp()
+    os.utime(other.path, (moment, moment))
+    moment += 24 * 3600
+    os.utime(one.path, (moment, moment))
 
-    words = f"{other.path} is not the LED file stored with pen LP-04 ({one.path})."
-    assert bench.pens.doubt_about(other) == words
+    assert bench.pens.doubt_about(other) == (
+        f"{other.path} of 2026-03-01 12:30 is not the LED file stored with pen LP-04 "
+        f"({one.path} of 2026-03-02 12:30)."
+    )
 
 
 def test_a_file_that_was_changed_since_is_not_used(bench: Bench) -> None:

@@ -209,6 +209,8 @@ class SourcePanel(Translated, QGroupBox):
     def set_searching(self, is_searching: bool) -> None:
         """Show whether a search for cameras is in progress."""
         self._is_searching = is_searching
+        if is_searching:
+            self._producer.set_faulty(False)
         self._refresh()
 
     def set_found(self, found: tuple[FoundDevice, ...]) -> None:
@@ -232,6 +234,7 @@ class SourcePanel(Translated, QGroupBox):
     def set_search_problem(self, why: str) -> None:
         """Show why cameras cannot be searched."""
         self._outcome = partial(StatusMessage.fault, why)
+        self._producer.set_faulty(bool(self._value.producer))
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
