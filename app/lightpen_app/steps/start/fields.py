@@ -100,6 +100,10 @@ class StationField(ChoiceField):
         # completer, its stub does not.
         self.setCompleter(None)  # type: ignore[arg-type]
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        # No wider than its neighbours, however long the name.
+        self.setSizeAdjustPolicy(
+            ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
 
         # Connections
         self._edit.textEdited.connect(self.value_edited)

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
+from tests.app.room import scrolled_sideways
 from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
 
@@ -369,6 +370,18 @@ def test_a_ball_that_is_typed_with_another_tip_stays(
     start.page.left()
     start.type_into("Probe tip", "T-97")
     assert start.text_of("Ball diameter") == "Not specified"
+
+
+def test_long_names_widen_no_field(show: Show, workbench: Workbench) -> None:
+    start = show(workbench)
+    for name in ("Station", "Operator", "Pen serial number", "Probe tip", "Cone"):
+        start.type_into(name, 300 * "W")
+
+    page = show(workbench).page
+    page.resize(640, 460)  # as in a window of 800 x 600
+    QApplication.processEvents()
+
+    assert scrolled_sideways(page) == ()
 
 
 # Stations
