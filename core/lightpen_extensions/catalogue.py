@@ -227,6 +227,7 @@ MESSAGES = {
     "drift.use-touches": "Next: use the points probed between the visits.",
     "drift.good": "The drift reference stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).",
     "drift.too-few": "The drift reference was visited once; drift needs two visits or more. Probe it before, during and after the session.",
+    "drift.open": "The drift reference seems to have moved by {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm), which noise alone explains.",
     "drift.moved": "The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.",
     "drift.uncertain": "The drift reference stays within {distance:.4f} mm, but its U is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a drift of that size would not be detected.",
     "tip.another": "The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Was the tip replaced, bent or refitted, or is it that of another pen?",

@@ -239,7 +239,7 @@ def normal_quantile(chance: float) -> float:
 
 
 @cache
-def chi_square_quantile(n_free: int, chance: float) -> float:
+def chi_square_quantile(n_free: float, chance: float) -> float:
     """Return the upper quantile of chi-square with ``n_free`` degrees of freedom."""
     from scipy.special import chdtri
 

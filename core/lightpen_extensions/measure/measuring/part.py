@@ -71,7 +71,9 @@ class CharacteristicResult:
     value: Value  # its U with that of a certified value
     lower: float  # limits, mm or degrees; infinite without a tolerance
     upper: float
-    decision: Decision | None  # None without a tolerance
+    # None without a tolerance; open for a form that noise alone may put beyond the
+    # limit of the station.
+    decision: Decision | None
     probability: float | None  # probability of conformity (JCGM 106)
     quantity: Quantity | None = None  # None for geometrical deviations
 
@@ -388,6 +390,9 @@ def _result(
             max_risk=limits.risk / 100,
         )
         probability = conformity_probability(*of_value, lower=lower, upper=upper)
+        is_form = planned.tolerance is None and planned.quantity in DEVIATIONS
+        if is_form and value.value - value.uncertainty <= upper < value.value:
+            decision = Decision.OPEN
     return CharacteristicResult(
         planned, value, lower, upper, decision, probability, quantity
     )

@@ -114,31 +114,33 @@ def _assessment(
     distance, spread = float(lengths[worst]), spreads[worst]
     along = scaled[worst] / max(distance, np.finfo(float).tiny)
     uncertainty = COVERAGE_FACTOR * float(np.sqrt(along @ spread @ along))
+    move = float(np.linalg.norm(moves[worst]))
+    stretch = move / distance if distance else 1.0  # U and limit as it moved
+    stated = {
+        "distance": move,
+        "uncertainty": stretch * uncertainty,
+        "limit": stretch * limits.drift,
+    }
     deviations = scaled[worst] @ np.linalg.pinv(spread) @ scaled[worst]
     is_significant = deviations > chi_square_quantile(3, BY_CHANCE)
-    move, limit = float(np.linalg.norm(moves[worst])), limits.drift
     grade = graded(distance, uncertainty, limits.drift, limits)
-    moved = message(
-        "drift.moved",
-        first=names[0],
-        visit=names[worst],
-        distance=move,
-        uncertainty=uncertainty,
-        limit=limit,
-    )
     if is_significant and grade is not Grade.PASS:
+        moved = message("drift.moved", first=names[0], visit=names[worst], **stated)
         return VerificationAssessment(grade, moved, VERIFY_AGAIN)
-    variances = np.diagonal(spreads, axis1=1, axis2=2)
-    largest = COVERAGE_FACTOR * float(np.sqrt(variances.max()))
+    variances = np.diagonal(spreads, axis1=1, axis2=2).max(axis=0)
+    axis = int(np.argmax(variances))
+    largest, share = COVERAGE_FACTOR * float(np.sqrt(variances[axis])), SCALES[axis]
     if largest > limits.drift:
         doubt = message(
-            "drift.uncertain", distance=move, uncertainty=largest, limit=limit
+            "drift.uncertain",
+            distance=move,
+            uncertainty=largest / share,
+            limit=limits.drift / share,
         )
         return check(doubt, TOUCH_LONGER)
-    if limits.decision(distance, uncertainty, limit) is not Decision.ACCEPTED:
-        return check(moved, TOUCH_LONGER)
-    good = message("drift.good", distance=move, uncertainty=uncertainty, limit=limit)
-    return accepted(good, USE_TOUCHES, Grade.STEADY)
+    if limits.decision(distance, uncertainty, limits.drift) is not Decision.ACCEPTED:
+        return check(message("drift.open", **stated), TOUCH_LONGER)
+    return accepted(message("drift.good", **stated), USE_TOUCHES, Grade.STEADY)
 
 
 def _screen(progress: TaskProgress) -> Screening:

@@ -213,6 +213,7 @@ class FixedPoint(Found):
     nominal: Scatter | None  # with the nominal tip, if known
     uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
     expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
+    freedom: FloatArray  # (3,), degrees of freedom of that deviation
     half_range_uncertainty: FloatArray  # (3,): 95 % of the half ranges by noise, mm
     tip: TipEvidence
 
@@ -240,8 +241,11 @@ def measure_fixed_point(
     covariance = joint_covariance(touches, instrument)
     blocks = covariance.reshape(n, 3, n, 3)
     of_mean = blocks.sum(axis=(0, 2)) / n**2
-    own = np.einsum("nini->i", blocks) / n
-    expected = np.sqrt(np.maximum((own - np.diag(of_mean)) * n / (n - 1), 0.0))
+    # Points unlike in noise scatter as fewer alike ones do (Welch, Satterthwaite).
+    about_mean = np.eye(n) - 1 / n
+    spreads = about_mean @ np.einsum("niMi->inM", blocks) @ about_mean
+    variances = np.einsum("inn->i", spreads)
+    freedom = variances**2 / np.sum(spreads**2, axis=(1, 2))
     found = FixedPoint(
         touches=touches,
         left_out=tuple(e for i, e in enumerate(points) if i not in kept),
@@ -250,7 +254,8 @@ def measure_fixed_point(
         if nominal_tip is None
         else scatter_of([with_tip(each, instrument, nominal_tip) for each in touches]),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
-        expected_deviation=expected,
+        expected_deviation=np.sqrt(variances / (n - 1)),
+        freedom=freedom,
         half_range_uncertainty=_half_range_by_noise(covariance),
         tip=points_evidence(touches, instrument, conditions.drift),
         assessment=accepted(_steady(calibrated)),
@@ -326,8 +331,8 @@ def _assessment(
 
 def _limit(found: FixedPoint, limits: VerificationLimits) -> FloatArray:
     """Return the limit of the standard deviation, (3,), mm, or what noise may show."""
-    n_free = len(found.touches) - 1
-    by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
+    quantiles = [chi_square_quantile(each, UNUSUAL) for each in found.freedom.tolist()]
+    by_chance = np.sqrt(np.array(quantiles) / found.freedom)
     limit = np.array([limits.across, limits.across, limits.along])
     return np.asarray(np.maximum(limit, by_chance * found.expected_deviation))
 

@@ -272,10 +272,9 @@ def sizes_of(part: MeasuredPart) -> list[CharacteristicResult]:
 
 def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAssessment:
     def named(decision: Decision) -> list[Message]:
-        results = part.results
-        return [each.planned.words for each in results if each.decision is decision]
+        return [each.planned.words for each in judged if each.decision is decision]
 
-    judged = [each for each in part.results if each.decision is not None]
+    judged = [e for e in part.results if e.decision and not _is_noise(e)]
     certified = [each for each in judged if each.planned.certified is not None]
     out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
     n_judged, name = len(judged), part.plan.words
@@ -310,6 +309,14 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
         return _judged_size(certified)
     good = message("part.good", part=name, n_judged=n_judged)
     return accepted(good, message("part.done"))
+
+
+def _is_noise(each: CharacteristicResult) -> bool:
+    """Return whether a form beside a size is open, which says nothing against it."""
+    planned, is_open = each.planned, each.decision is Decision.OPEN
+    return (
+        is_open and planned.certified is not None and planned.quantity not in CERTIFIED
+    )
 
 
 def _judged_size(results: Sequence[CharacteristicResult]) -> VerificationAssessment:

@@ -134,7 +134,7 @@ def test_a_reference_seems_to_move_once_in_two_hundred_times(
     assert within.grade is (Grade.CHECK if by > 1 else Grade.STEADY)
     said = beyond.reason.values
     assert said["distance"] == pytest.approx(moved[axis])
-    assert said["uncertainty"] == pytest.approx(2 * np.sqrt(2) * sigma[axis] * share)
+    assert said["uncertainty"] == pytest.approx(2 * np.sqrt(2) * sigma[axis])
     assert found(5 * share * moved[axis]).reason.code == "drift.good"
 
 

@@ -1,6 +1,7 @@
 """Tests of `lightpen_extensions.measure.tasks.fixed_point`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -193,6 +194,10 @@ def test_touches_alike_are_expected_to_scatter_by_their_noise(
     # What all of them share moves none against another.
     noise = np.sqrt(np.diag(touches[0].noise))
     np.testing.assert_allclose(found.expected_deviation, noise, rtol=1e-6)
+    np.testing.assert_allclose(found.freedom, 2.0)
+    noisy = replace(touches[0], noise=1e6 * touches[0].noise)
+    of_one = measure_fixed_point([("", (*touches, noisy))], Conditions(instrument))
+    np.testing.assert_allclose(of_one.freedom, 1.0, rtol=1e-3)
 
 
 @pytest.mark.parametrize("n_touches", [6, 8, 20])

@@ -99,7 +99,7 @@ def cone(
     scatter = Scatter(np.outer([0.0, np.sqrt(2)], deviation))
     return fixed_point.FixedPoint(
         *(accepted(REASON), touches, (), scatter, None, np.zeros(3)),
-        *(np.full(3, expected), np.zeros(3), tip),
+        *(np.full(3, expected), np.full(3, 5.0), np.zeros(3), tip),
     )
 
 
@@ -119,7 +119,7 @@ def cone(
         ([0.019, 0.0, 0.0], 0.019 / 13.0**0.5, "moved verify-again check"),
         ([0.0, 0.0, 0.0], 0.0099, "good drift.use-touches steady"),
         ([0.0, 0.0, 0.0], 0.0101, "uncertain drift.touch-longer check"),
-        ([0.03, 0.0, 0.0], 0.0098, "moved drift.touch-longer check"),
+        ([0.03, 0.0, 0.0], 0.0098, "open drift.touch-longer check"),
     ],
 )
 def test_a_drift_reference(move: list[float], sigma: float, verdict: str) -> None:
@@ -135,8 +135,8 @@ def test_a_drift_reference(move: list[float], sigma: float, verdict: str) -> Non
             "first": "a",
             "visit": "b",
             "distance": pytest.approx(np.linalg.norm(move)),
-            "uncertainty": pytest.approx(2 * sigma / along),
-            "limit": 0.02,
+            "uncertainty": pytest.approx(2 * sigma),
+            "limit": pytest.approx(0.02 * along),
         }
 
 
