@@ -167,8 +167,9 @@ def test_nothing_is_scrolled_amid_probing_nor_at_its_result(
 ) -> None:
     for step in PROBING:
         for each in (step, step + OTHERWISE):
-            figure, *_ = seen.rooms[each, language, 1280]
-            assert figure.downwards == ()
+            for width in (1280, LEAST.width()):
+                figure, *_ = seen.rooms[each, language, width]
+                assert "PageScroll" not in figure.downwards
 
 
 @pytest.mark.parametrize("language", languages())

@@ -84,7 +84,7 @@ class CheckList(QListWidget):
             self.scrollToItem(self.item(min(index + 1, self.count() - 1)))
 
 
-LEAST_ROW, TALL_ROW, TALLEST_ROW = 3 * GRID, 5 * GRID, 7 * GRID  # px
+LEAST_ROW, TALL_ROW, TALLEST_ROW = 5 * GRID // 2, 5 * GRID, 7 * GRID  # px
 LIMIT_HEIGHT = 2 * GRID  # px, of a written limit
 NAME_SHARE, BAR_SHARE = 0.3, 0.33  # of the width; the rest is for the value
 MARGIN = 0.12  # of the range of limits and values

@@ -250,7 +250,7 @@ class MeasurePage(ProbingPage):
     @override
     def _show(self) -> None:
         lacks_plan = self._measures.lacks_plan()
-        for widget in (self._work, self._plan.of_part):
+        for widget in (self._work, self._progress.state, self._plan.of_part):
             widget.setVisible(not lacks_plan)
         super()._show()
         self._plan.set_status(self._run.status, lacks_plan=lacks_plan)

@@ -146,7 +146,7 @@ class PartView(Translated, QWidget):
             painter.drawEllipse(mark, TIP, TIP)
 
 
-PICTURE_HEIGHT = 18 * GRID  # px, at least
+PICTURE_HEIGHT, LOW_PICTURE_HEIGHT = 18 * GRID, 9 * GRID  # px, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +167,7 @@ class FigurePanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self._value, self._is_low = FigureValue(), False
 
         # Widgets
         self._title = FittedText(TextSize.TITLE, wraps=False)
@@ -176,31 +177,42 @@ class FigurePanel(QWidget):
         self._bands = BandChart()
 
         # Layout
-        layout = vertical_layout(self, margins=GRID)
+        layout = vertical_layout(self, margins=(GRID, GRID // 2, GRID, GRID // 2))
         cells = (self._title, 1), (self._live, 1), self._do
         self.head = horizontal_layout(layout, *cells)  # more of it may be added
         for picture in (self._part, self._dial):
-            picture.setMinimumHeight(PICTURE_HEIGHT)
             layout.addWidget(picture, 3)
         layout.addWidget(self._bands, 1)
 
         # Connections
         self._do.clicked.connect(self.asked)
 
+    def set_low(self, *, low: bool) -> None:
+        """Show either the picture or the values, and what is nowhere else; or all."""
+        self._is_low = low
+        for picture in (self._part, self._dial):
+            picture.setMinimumHeight(LOW_PICTURE_HEIGHT if low else PICTURE_HEIGHT)
+        for words in (self._title, self._live):
+            words.setHidden(low)
+        self.set_value(self._value)
+
     def set_value(self, value: FigureValue) -> None:
         """Show another moment."""
+        self._value = value
         self._title.set_text(value.title)
         self._live.set_text(value.live, bold=False)
         self._do.setText(value.action)
         self._do.setVisible(bool(value.action))
-        picture = value.picture
+        picture, bands = value.picture, value.bands
+        if self._is_low and picture is not None and bands:
+            picture, bands = (picture, ()) if value.live else (None, bands)
         self._part.setVisible(isinstance(picture, PartValue))
         self._dial.setVisible(isinstance(picture, DialValue))
         if isinstance(picture, PartValue):
             self._part.set_value(picture)
         elif isinstance(picture, DialValue):
             self._dial.set_value(picture)
-        self._bands.set_bands(value.bands)
+        self._bands.set_bands(bands)
 
 
 def posture_value(setup: SessionSetup, state: SessionState) -> DialValue:

@@ -82,7 +82,7 @@ class PlanPanel(Translated, QWidget):
 
         # Layout
         vertical_layout(self, self._question, (self._start, 1))
-        rows = vertical_layout(self._start, 1, spacing=3 * GRID, margins=4 * GRID)
+        rows = vertical_layout(self._start, 1, spacing=2 * GRID, margins=2 * GRID)
         buttons = self.open_button, self._teach, self._plate
         for button, text in zip(buttons, texts, strict=True):
             words = self.say(text_label(TextSize.LEAD), text)

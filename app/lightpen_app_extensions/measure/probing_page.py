@@ -19,7 +19,7 @@ from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app_extensions.measure.check_list import CheckList
-from lightpen_app_extensions.measure.part_view import FigurePanel
+from lightpen_app_extensions.measure.part_view import LOW_PICTURE_HEIGHT, FigurePanel
 from lightpen_app_extensions.measure.presenter import VerifyPresenter, VerifyView
 from lightpen_app_extensions.measure.progress_panel import DetailsView, ProgressPanel
 from lightpen_app_extensions.measure.service import (
@@ -48,7 +48,8 @@ class ProbingPage(ResponsiveLayout, Page):
     """
 
     shows_images = True
-    narrow_below = 112 * GRID  # px; then the list is behind a tab, too
+    # px; then the list is behind a tab, too; then what is said twice is hidden
+    narrow_below, low_below = 112 * GRID, 64 * GRID
 
     def __init__(
         self,
@@ -74,6 +75,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._work, self._checks = QWidget(), CheckList()
         self._figure, self._details = FigurePanel(), DetailsView()
         self._image = ImageView()
+        self._image.setMinimumHeight(LOW_PICTURE_HEIGHT)
         self._tabs = QTabWidget()
         for tab in (self._figure, self._details, self._image):
             self._tabs.addTab(tab, "")
@@ -87,6 +89,7 @@ class ProbingPage(ResponsiveLayout, Page):
 
         # Layout
         layout, scroll = vertical_layout(self, self._progress), PageScroll()
+        self._column = layout
         content = ShrinkingScrollContent()
         self._rows = vertical_layout(content)  # more of them may be added
         self._body = horizontal_layout(self._work, (self._stack, 1), spacing=2 * GRID)
@@ -189,7 +192,10 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def _use_room(self) -> None:
         """Place the list beside or behind the figure."""
-        is_narrow = self._room.is_narrow
+        is_narrow, is_low = self._room.is_narrow, self._room.is_low
+        self._column.setSpacing(0 if is_low else GRID)
+        self._progress.set_low(low=is_low)
+        self._figure.set_low(low=is_low)
         self._checks.set_wide(is_narrow)
         if is_narrow:
             self._tabs.addTab(self._checks, self.tr("List"))

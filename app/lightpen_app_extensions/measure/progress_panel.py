@@ -36,7 +36,7 @@ from lightpen_extensions.measure.measuring.report import ResultTable, points_tab
 from lightpen_extensions.measure.session import SessionSetup, SessionState
 
 PROGRESS_STEPS = 1000
-STATE_HEIGHT = 9 * GRID  # px, at least
+STATE_HEIGHT, LOW_STATE_HEIGHT = 9 * GRID, 5 * GRID  # px, at least
 
 
 class ProgressPanel(ResponsiveLayout, Translated, QWidget):
@@ -72,7 +72,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(STATE_HEIGHT)
-        self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
+        self.state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
         self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
         bar = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
@@ -82,7 +82,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         layout = vertical_layout(self, self._question, self._reason)
         self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         horizontal_layout(
-            self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
+            self.state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
         numbers = 1, self._count, self._progress, 1
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
@@ -120,6 +120,11 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         if not view.can_be_accepted:
             self._reason.hide()
 
+    def set_low(self, *, low: bool) -> None:
+        """Make do with little height, or not."""
+        self._banner.set_word_size(TextSize.LEAD if low else TextSize.TITLE)
+        self._banner.setMinimumHeight(LOW_STATE_HEIGHT if low else STATE_HEIGHT)
+
     def add_button(self, button: QWidget) -> None:
         """Add a button, or several, after the others."""
         self._row.insertWidget(self._row.count() - 1, button)
@@ -138,7 +143,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         is_narrow = self._room.is_narrow
         wide = (0, 0), (1, 0), (2, 0), (0, 1, 3, 1)
         narrow = (0, 0), (1, 0, 1, 2), (0, 1), (2, 0, 1, 2)
-        cells = self._instruction, self._hint, self._buttons, self._state
+        cells = self._instruction, self._hint, self._buttons, self.state
         for cell, place in zip(cells, narrow if is_narrow else wide, strict=True):
             self._rows.removeWidget(cell)
             self._rows.addWidget(cell, *place)
