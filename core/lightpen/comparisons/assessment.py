@@ -99,15 +99,6 @@ def _is_significant(
 DRIFT = message("file.drift")
 
 
-@dataclass(frozen=True)
-class Scale:
-    """Factor for the coordinates of the pen file; U (k = 2) with it and before."""
-
-    factor: float
-    uncertainty: float
-    uncertainty_before: float
-
-
 class _Drift(Struct):
     standard_uncertainty_share_mm: Vector
 

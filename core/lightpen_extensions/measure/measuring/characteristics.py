@@ -133,8 +133,8 @@ class Value:
 
 def evaluate(
     planned: PlannedCharacteristic, of: Mapping[str, Measured], touches: PartTouches
-) -> tuple[Value, Quantity | None]:
-    """Return a characteristic, and its quantity if it is a smooth one.
+) -> Value:
+    """Return the value of a characteristic.
 
     Raises `CalibrationError` if the characteristic is not defined for features of these
     kinds.
@@ -145,10 +145,10 @@ def evaluate(
     if not is_defined(planned.quantity, kinds, None if datum is None else datum.kind):
         raise _refused(planned)
     if planned.quantity in DEVIATIONS:
-        return _deviation(planned, found[0], datum, touches.inputs), None
+        return _deviation(planned, found[0], datum, touches.inputs)
     quantity = _smooth(planned.quantity, found, touches.ball)
     uncertainty = quantity.uncertainty(touches.inputs)[0]
-    return Value(float(quantity.values[0]), float(uncertainty)), quantity
+    return Value(float(quantity.values[0]), float(uncertainty))
 
 
 def _refused(planned: PlannedCharacteristic) -> CalibrationError:

@@ -90,6 +90,13 @@ class ProbedFeature:
         is_thin = self.kind in {FeatureKind.POINT, FeatureKind.LINE}
         return is_thin and self.planned.side is Side.AUTO
 
+    def normals(self, touches: PartTouches) -> FloatArray:
+        """Return the normals of the surface at its touches, (n, 3), outwards."""
+        fit = self.fit
+        q = (touches.points_cam[self.at] - fit.origin) @ fit.axes
+        gradients = SURFACES[fit.kind].distances(q, fit.sizes).by_point[:, 0]
+        return np.asarray(gradients @ fit.axes.T)
+
 
 def surface_of(
     probed: ProbedFeature, touches: PartTouches, normal: Normal | None = None
@@ -161,12 +168,10 @@ def along_touches(axis: Quantity, points: FloatArray) -> Quantity:
 
 def _side(probed: ProbedFeature, touches: PartTouches) -> tuple[Side, Evidence]:
     """Return on which side of a round surface the ball was."""
-    planned, feature, at = probed.planned, probed.fit, probed.at
+    planned, at = probed.planned, probed.at
     if planned.side is not Side.AUTO:
         return planned.side, Evidence.PLAN
-    surface = SURFACES[feature.kind]
-    q = (touches.points_cam[at] - feature.origin) @ feature.axes
-    outwards = surface.distances(q, feature.sizes).by_point[:, 0] @ feature.axes.T
+    outwards = probed.normals(touches)
     approach = np.einsum("ni,ni->n", touches.approaches_cam[at], outwards)
     approach[~(np.abs(approach) > CLEAR)] = np.nan  # along the surface
     if np.isfinite(approach).any():

@@ -59,7 +59,8 @@ OUTLYING = 6.0  # of their noise, which is added to both
 MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
 LYING = 0.2  # mm from a plane, of a point or line that was probed on it
 FREE = 0.5  # singular value of residuals that a fit leaves free; the others are 0
-TINY, EXACT = 1e-12, 1e-3  # mm^2; relative, of the variance of form
+TINY = 1e-12  # mm^2
+MOST, FINER, N_FORMS = 3.0, 0.97, 400  # variances of form that are tried
 ROUNDS = 3  # of alignments by points whose normals are stated in the frame they give
 
 
@@ -75,7 +76,6 @@ class CharacteristicResult:
     # limit of the station.
     decision: Decision | None
     probability: float | None  # probability of conformity (JCGM 106)
-    quantity: Quantity | None = None  # None for geometrical deviations
 
     @property
     def deviation(self) -> float | None:
@@ -122,8 +122,8 @@ def measure_part(
     were_recognised = {each.name for each in plan.features if each.kind is None}
     plan = _with_kinds(plan, touches)
     probed = {each.name: _of_centres(each, touches) for each in plan.features}
-    with_form = _with_form(touches, probed.values())
     surfaces = _surfaces(plan, probed, touches, were_recognised)
+    with_form = _with_form(touches, probed.values(), surfaces)
     alignment = _aligned(plan, surfaces)
     features = {}
     for name, surface in surfaces.items():
@@ -154,22 +154,32 @@ def _of_centres(planned: PlannedFeature, touches: PartTouches) -> ProbedFeature:
     return ProbedFeature(planned, fit, at, quantity, touches.points(at))
 
 
-def _with_form(touches: PartTouches, probed: Iterable[ProbedFeature]) -> PartTouches:
+def _with_form(
+    touches: PartTouches,
+    probed: Iterable[ProbedFeature],
+    surfaces: Mapping[str, TouchedSurface],
+) -> PartTouches:
     """Return touches as uncertain as the form of the part makes its features by them.
 
-    Few points miss the feature of a whole surface by its form. The variance of form is
-    what all residuals along normals show beyond the covariance of the points.
+    Few points miss the feature of a whole surface by its form. The variance of form,
+    along normals, is the most likely one by what all residuals show beyond the
+    covariance of the points; where that is large they count little.
     """
-    squares, variances, at = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=int)]
+    squares, variances, covariance = [], [], touches.covariance.copy()
+    ways = np.zeros((len(touches.points_cam), 3, 3))  # normals, each with itself
     for each in probed:
         if each.kind is FeatureKind.POINT:
             continue
-        columns = touches.columns(each.at)
-        at.append(columns)
-        if each.kind is FeatureKind.LINE:
-            continue  # the hand chooses where across it
-        normals = slice(None, None, each.fit.distances.shape[1])
-        follow = each.fit.distances_by_points[normals]
+        if each.kind is FeatureKind.LINE:  # the hand chooses where across it
+            way = surfaces[each.planned.name].quantity.values - each.quantity.values
+            length = float(np.linalg.norm(way[PLACE]))
+            unit = way[PLACE] / max(length, TINY)
+            ways[each.at] = np.outer(unit, unit) if length > TINY else np.eye(3)
+            continue
+        normals = each.normals(touches)
+        ways[each.at] = normals[:, :, None] * normals[:, None]
+        columns, first = touches.columns(each.at), each.fit.distances.shape[1]
+        follow = each.fit.distances_by_points[::first]
         axes, sizes, _ = np.linalg.svd(follow, full_matrices=False)
         free = axes[:, sizes > FREE]
         rows = free.T @ follow
@@ -177,18 +187,20 @@ def _with_form(touches: PartTouches, probed: Iterable[ProbedFeature]) -> PartTou
         own, turn = np.linalg.eigh(spread)
         squares.append((turn.T @ free.T @ each.fit.distances[:, 0]) ** 2)
         variances.append(own.clip(min=TINY))
-    square, variance = np.concatenate(squares), np.concatenate(variances)
-    n = len(square)
-    expected = n**2 / (n + 2)  # less than n, as n squares leave a variance uncertain
-    low, high = 0.0, float(square.sum()) / max(expected, TINY)
-    if np.sum(square / variance) <= expected:
+    if not squares:
         return touches
-    while high - low > EXACT * high:
-        middle = (low + high) / 2
-        is_more = np.sum(square / (variance + middle)) > expected
-        low, high = (middle, high) if is_more else (low, middle)
-    covariance = touches.covariance.copy()
-    covariance[(np.concatenate(at),) * 2] += high
+    square, variance = np.concatenate(squares), np.concatenate(variances)
+    forms = MOST * square.mean() * FINER ** np.arange(N_FORMS) + TINY
+    weights = 1 / (variance[:, None] + forms)
+    total = weights.sum(axis=0)
+    freedom = total**2 / np.sum(weights**2, axis=0)
+    # Less is expected, as few squares leave a variance uncertain.
+    is_more = square @ weights**2 > total * freedom / (freedom + 2)
+    if is_more.any():
+        form = forms[np.argmax(is_more)]  # the largest of them
+        for i, way in enumerate(ways):
+            at = slice(3 * i, 3 * i + 3)
+            covariance[at, at] += form * way
     return replace(touches, covariance=covariance)
 
 
@@ -373,7 +385,7 @@ def _result(
     touches: PartTouches,
     limits: VerificationLimits,
 ) -> CharacteristicResult:
-    value, quantity = evaluate(planned, features, touches)
+    value = evaluate(planned, features, touches)
     lower, upper = planned.limits
     if planned.certified is not None:
         both = float(np.hypot(value.uncertainty, planned.certified))
@@ -393,9 +405,7 @@ def _result(
         is_form = planned.tolerance is None and planned.quantity in DEVIATIONS
         if is_form and value.value - value.uncertainty <= upper < value.value:
             decision = Decision.OPEN
-    return CharacteristicResult(
-        planned, value, lower, upper, decision, probability, quantity
-    )
+    return CharacteristicResult(planned, value, lower, upper, decision, probability)
 
 
 def _limits_of_error(

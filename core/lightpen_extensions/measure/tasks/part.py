@@ -17,7 +17,6 @@ from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import (
     BETTER_POSTURES,
     CHECK_FILES,
-    Scale,
     VerificationAssessment,
     accepted,
     check,
@@ -28,7 +27,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Side
-from lightpen.model.coverage import COVERAGE_FACTOR, Decision
+from lightpen.model.coverage import Decision
 from lightpen.model.rigid import UPRIGHT_AXIS
 from lightpen.record.folder import MEASURED_PART
 from lightpen_extensions.measure.measuring.features import Feature, fit_feature
@@ -47,7 +46,6 @@ from lightpen_extensions.measure.measuring.part import (
 from lightpen_extensions.measure.measuring.plan import (
     CERTIFIED,
     IS_ANGLE,
-    CharacteristicKind,
     Plan,
     PlannedFeature,
 )
@@ -344,40 +342,6 @@ def _judged_size(results: Sequence[CharacteristicResult]) -> VerificationAssessm
     return accepted(good, BETTER_POSTURES, Grade.SCALE)
 
 
-def scale_of(
-    part: MeasuredPart, points: Sequence[ProbedPoint], instrument: Instrument
-) -> Scale | None:
-    """Return the scale from prior and lengths (least squares); None without lengths.
-
-    An error of the pen's scale leaves no residual and moves nothing that stands still;
-    a length shows it.
-    """
-    lengths = [
-        (each.value.value - (each.planned.nominal or 0.0), each.planned.certified, each)
-        for each in part.results
-        if each.planned.quantity is CharacteristicKind.LENGTH and each.quantity
-    ]
-    rows = [e.quantity.by_inputs[0] for *_, e in lengths if e.quantity is not None]
-    known = np.array([u for _, u, _ in lengths if u is not None])
-    if not rows or len(known) < len(rows):
-        return None
-    errors, by_inputs = np.array([error for error, *_ in lengths]), np.array(rows)
-    by_instrument = by_inputs[:, :-1] @ np.concatenate([p.sensitivity for p in points])
-    leds = instrument.pen.leds - instrument.pen.leds.mean(axis=0)
-    of_scale = np.zeros(len(instrument.covariance))
-    of_scale[instrument.parameters.leds] = (leds / np.sum(leds**2)).ravel()
-    shared = by_instrument @ instrument.covariance @ of_scale
-    spread = by_inputs @ part.touches.inputs @ by_inputs.T
-    spread += np.outer(known, known) / COVERAGE_FACTOR**2
-    gain = np.linalg.solve(spread, shared)
-    before = float(of_scale @ instrument.covariance @ of_scale)
-    return Scale(
-        factor=1.0 - float(gain @ errors),
-        uncertainty=COVERAGE_FACTOR * max(before - float(gain @ shared), 0.0) ** 0.5,
-        uncertainty_before=COVERAGE_FACTOR * before**0.5,
-    )
-
-
 def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
     more = [message("measuring.named", name="...")] if len(names) > MOST_NAMED else []
     return (*names[:MOST_NAMED], *more)
@@ -385,16 +349,8 @@ def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
 
 def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     points = [point for _, point in found.points]
-    scale = scale_of(found.part, points, instrument)
     return {
         **part_entries(found.part),
-        "scale": None
-        if scale is None
-        else {
-            "factor": scale.factor,
-            "expanded_uncertainty": scale.uncertainty,
-            "expanded_uncertainty_before": scale.uncertainty_before,
-        },
         "missing": list(found.missing),
         "touches": [
             {

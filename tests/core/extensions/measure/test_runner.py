@@ -100,16 +100,6 @@ def test_two_cameras_verify_a_tip_together(
     assert names == ["camera.yaml", "camera-2.yaml"]
 
 
-@pytest.mark.slow
-def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
-    at_it.come(PART_CHOICES)
-    at_it.touch(*round_a_ring(11, 31.751)[:10], *BAR)
-    part, _ = at_it.status.files
-
-    scale = json.loads(part.read_text())["scale"]
-    assert scale["factor"] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_what_cannot_be_kept_is_reported_and_kept_later(at_it: Verifier) -> None:
     at_it.pick_up()
     at_it.see(at_it.holder.still(leant(4)[0], 2))  # begins, and keeps no image

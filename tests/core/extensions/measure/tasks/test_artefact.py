@@ -1,13 +1,11 @@
 """Artefacts: a plan with a certified value, the paper's Table 3, the pen's scale."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import Scale
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -15,7 +13,7 @@ from lightpen.model.artefacts import Artefact, ArtefactKind, Side
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.measuring.plan import are_of_second_end, artefact_plan
 from lightpen_extensions.measure.measuring.plan_checks import problems_of
-from lightpen_extensions.measure.tasks.part import PART, Part, scale_of, sizes_of
+from lightpen_extensions.measure.tasks.part import Part, sizes_of
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 from lightpen_extensions.measure.tasks.registry import measure_artefacts, size_table
 from lightpen_extensions.measure.tasks.task import Conditions
@@ -166,45 +164,6 @@ def test_a_camera_that_moved_makes_a_length_less_certain_along_it(
     # Both ends may be off.
     moved = np.hypot(u, 2 * 0.01 * np.sqrt(2))
     assert along[0].value.uncertainty == pytest.approx(moved, rel=1e-3)
-
-
-def test_a_pen_that_grew_is_reported_by_the_length(
-    instrument: Instrument, touching: Touching
-) -> None:
-    grown, larger = 5e-4, instrument.covariance.copy()
-    leds = instrument.pen.leds - instrument.pen.leds.mean(axis=0)
-    at = instrument.parameters.leds
-    larger[at, at] += 1e-6 * np.outer(leds, leds)  # the scale is known to 0.1 % only
-    unsure = replace(instrument, covariance=larger)
-    # A pen of which the file says too little measures too little.
-    shrunk, half = PAPER_CONE / (1 + grown), HALF / (1 + grown)
-    ends = np.array([shrunk - half, shrunk + half])
-    runs = [touching(ends, seed=seed, tilt=0.0) for seed in range(3)]
-
-    def scale(u: float) -> Scale:
-        bar = Artefact(ArtefactKind.LENGTH, 150.0, u)
-        found = measured(bar, Conditions(unsure), *runs)
-        scale = scale_of(found.part, [point for _, point in found.points], unsure)
-        assert scale is not None
-        entries = PART.entries(found, unsure)["scale"]
-        assert entries["factor"] == scale.factor
-        return scale
-
-    known, vague = scale(0.0), scale(0.1)
-    assert known.factor - 1 == pytest.approx(grown, rel=0.3)
-    assert known.uncertainty < 0.2 * known.uncertainty_before
-    # All three are off by what is certified; before that, U is 0.2 %.
-    by_length = np.hypot(0.1 / 150.0, known.uncertainty)
-    together = (by_length**-2 + known.uncertainty_before**-2) ** -0.5
-    assert vague.uncertainty == pytest.approx(together, rel=0.05)
-
-
-def test_a_ring_tells_no_scale(
-    instrument: Instrument, touching: Touching, ring: Callable[..., FloatArray]
-) -> None:
-    found = measured(RING, Conditions(instrument), touching(ring()))
-
-    assert scale_of(found.part, [p for _, p in found.points], instrument) is None
 
 
 def test_the_limit_of_a_length_is_a_constant_and_what_each_metre_adds(
