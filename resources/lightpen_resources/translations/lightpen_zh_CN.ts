@@ -2910,7 +2910,7 @@
     </message>
     <message>
         <source>{0} of {1}</source>
-        <translation type="unfinished"></translation>
+        <translation>{0}（{1}）</translation>
     </message>
     <message>
         <source>LED file</source>
@@ -5261,15 +5261,15 @@ needed</source>
     </message>
     <message>
         <source>Bending (part of U when measuring): {assumed:.3f} mm assumed; a press test measures it.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
     </message>
     <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
@@ -6269,7 +6269,7 @@ needed</source>
     </message>
     <message>
         <source>top front hole bore dome countersink pad</source>
-        <translation type="unfinished"></translation>
+        <translation>上面 前面 孔 内孔 球面 锥孔 凸台</translation>
     </message>
     <message>
         <source>x and y of the LED centres are exchanged</source>
@@ -8173,7 +8173,7 @@ needed</source>
     </message>
     <message>
         <source>The pose of camera {camera} in the rig file differs from the images by {angle:.1f}° and {distance:.0f} mm. Check that the file has cam_from_rig in millimetres (a point p of the first camera is at R p + t), that it matches the current camera positions, and that the images are in the order of its cameras; or calibrate the rig again.</source>
-        <translation type="unfinished"></translation>
+        <translation>相机 {camera} 在相机组文件中的位姿与图像相差 {angle:.1f}° 和 {distance:.0f} mm。请检查文件给出的是以毫米为单位的 cam_from_rig（第一台相机的点 p 位于 R p + t）、是否与当前相机位置一致，以及图像是否按文件中相机的顺序给出；或重新标定相机组。</translation>
     </message>
     <message>
         <source>The probed points of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
