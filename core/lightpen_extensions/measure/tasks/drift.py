@@ -115,17 +115,20 @@ def _assessment(
     along = scaled[worst] / max(distance, np.finfo(float).tiny)
     uncertainty = COVERAGE_FACTOR * float(np.sqrt(along @ spread @ along))
     move = float(np.linalg.norm(moves[worst]))
-    stretch = move / distance if distance else 1.0  # U and limit as it moved
-    stated = {
-        "distance": move,
-        "uncertainty": stretch * uncertainty,
-        "limit": stretch * limits.drift,
-    }
+    stretch = move / distance if distance else 1.0
+    u, limit = stretch * uncertainty, stretch * limits.drift  # as it moved
     deviations = scaled[worst] @ np.linalg.pinv(spread) @ scaled[worst]
     is_significant = deviations > chi_square_quantile(3, BY_CHANCE)
     grade = graded(distance, uncertainty, limits.drift, limits)
     if is_significant and grade is not Grade.PASS:
-        moved = message("drift.moved", first=names[0], visit=names[worst], **stated)
+        moved = message(
+            "drift.moved",
+            first=names[0],
+            visit=names[worst],
+            distance=move,
+            uncertainty=u,
+            limit=limit,
+        )
         return VerificationAssessment(grade, moved, VERIFY_AGAIN)
     variances = np.diagonal(spreads, axis1=1, axis2=2).max(axis=0)
     axis = int(np.argmax(variances))
@@ -139,8 +142,10 @@ def _assessment(
         )
         return check(doubt, TOUCH_LONGER)
     if limits.decision(distance, uncertainty, limits.drift) is not Decision.ACCEPTED:
-        return check(message("drift.open", **stated), TOUCH_LONGER)
-    return accepted(message("drift.good", **stated), USE_TOUCHES, Grade.STEADY)
+        seems = message("drift.open", distance=move, uncertainty=u, limit=limit)
+        return check(seems, TOUCH_LONGER)
+    good = message("drift.good", distance=move, uncertainty=u, limit=limit)
+    return accepted(good, USE_TOUCHES, Grade.STEADY)
 
 
 def _screen(progress: TaskProgress) -> Screening:
