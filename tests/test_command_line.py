@@ -23,7 +23,6 @@ from lightpen.arrays import FloatArray
 from lightpen.formats.observation_files import read_poses
 from lightpen.logs import log_file
 from lightpen_program.extensions import main
-from lightpen_resources import languages
 
 Run = Callable[..., CompletedProcess[str]]
 Record = Callable[..., dict[str, Any]]
@@ -556,7 +555,6 @@ class WitnessingDesktop:
 
     def __init__(self, fault: OSError | None = None) -> None:
         self.opened: list[Path | None] = []
-        self.papers: list[tuple[Path, Path | None, str]] = []
         self._fault = fault
 
     def show_window(self, swing: Path | None) -> int:
@@ -573,13 +571,6 @@ class WitnessingDesktop:
 
     def data_folder(self) -> Path:
         raise NotImplementedError
-
-    def languages(self) -> tuple[str, ...]:
-        return languages()
-
-    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
-        self.papers.append((result, out, language))
-        return out or Path("named.pdf")
 
 
 def test_what_the_window_cannot_read_is_not_taken_for_output_that_fails() -> None:
@@ -621,29 +612,6 @@ def test_a_name_that_cannot_be_looked_up_is_no_mistake_of_the_program() -> None:
     with suppress(SystemExit):
         assert main([name], desktop := WitnessingDesktop()) == 0
         assert desktop.opened == [Path(name)]
-
-
-def test_a_record_on_paper_is_reported_where_it_is(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    desktop, result = WitnessingDesktop(), Path("000001.json")
-
-    assert main(["report", "000001.json"], desktop) == 0
-    words = ["report", "000001.json", "--out", "a.pdf", "--language", "zh_CN"]
-    assert main(words, desktop) == 0
-
-    assert desktop.papers == [(result, None, "en"), (result, Path("a.pdf"), "zh_CN")]
-    assert "named.pdf" in capsys.readouterr().out
-
-
-def test_a_result_is_not_replaced_by_its_record_on_paper(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    desktop = WitnessingDesktop()
-
-    assert main(["report", "tip.json", "--out", "./tip.json"], desktop) == 2
-    assert desktop.papers == []
-    assert "would replace its input" in capsys.readouterr().err
 
 
 def test_a_word_that_is_neither_command_nor_file_is_refused(

@@ -19,8 +19,9 @@ from lightpen.formats.opened_files import InputFile
 from lightpen.formats.own_json import record_bytes, record_heading
 from lightpen.local_time import local_now
 from lightpen.record.folder import read_verification
-from lightpen_app.print_report.verification import verification_print_report
-from lightpen_app.reporting import write_report
+from lightpen_app_extensions.report.reporting import write_report
+from lightpen_app_extensions.report.verification import verification_print_report
+from lightpen_program.extensions import main
 
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
@@ -38,6 +39,13 @@ def test_a_record_is_put_on_paper_without_a_display(
     assert (outcome.returncode, outcome.stderr) == (0, "")
     assert "tip.pdf" in outcome.stdout
     assert out.read_bytes().startswith(b"%PDF-1.4")
+
+
+def test_a_result_is_not_replaced_by_its_record_on_paper(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["report", "tip.json", "--out", "./tip.json"]) == 2
+    assert "would replace its input" in capsys.readouterr().err
 
 
 @pytest.fixture

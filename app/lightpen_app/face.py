@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 
 from PySide6.QtCore import QObject, Signal
@@ -13,6 +14,7 @@ from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
@@ -94,6 +96,24 @@ class MenuEntry:
     choose: Callable[[QWidget], None]  # given the window
 
 
+class ReportPrinter(QObject):
+    """Shows the report of a result; this one cannot, without an extension that does."""
+
+    saved = Signal(object)  # Path: the PDF that was written
+    failed = Signal(str)  # the sentence why something is not shown, or was not saved
+
+    is_here = False
+
+    def show(self, find: Callable[[], Path]) -> None:
+        """Show the report of the calibration that a function finds on the disk."""
+
+    def show_verification(self, path: Path) -> None:
+        """Show the report of a verification."""
+
+    def shut_down(self) -> None:
+        """Cancel what is not shown yet."""
+
+
 class Service(QObject):
     """An extension at work in one window; by default it does nothing.
 
@@ -111,6 +131,8 @@ class Service(QObject):
     verify_step = ""  # key of its page where a tip is verified
     calibrates_cameras = False  # by `calibrate_camera`
     discovers = False  # finds pen and camera without files, by `discover`
+    # Makes what shows reports, for a page.
+    report_printer: Callable[[SavePlace, QWidget], ReportPrinter] | None = None
 
     @property
     def is_here(self) -> bool:
@@ -202,6 +224,14 @@ def event_text(services: Services, event: "Event") -> str:
 def export_formats(services: Services) -> "tuple[ExportFormat, ...]":
     """Return the formats that extensions add to those of main."""
     return tuple(form for each in services for form in each.export_formats())
+
+
+def report_printer(
+    services: Services, place: SavePlace, page: QWidget
+) -> ReportPrinter:
+    """Return what shows reports for a page."""
+    makers = (each.report_printer for each in services if each.report_printer)
+    return next((make(place, page) for make in makers), ReportPrinter(page))
 
 
 def can_discover(services: Services) -> bool:

@@ -9,7 +9,7 @@ SELF_TEST = "--self-test"
 
 
 class Launchers:
-    """Starts window, demo, self-test and reports; imports each when needed.
+    """Starts window, demo and self-test; imports each when needed.
 
     Commands start faster without the window's libraries.
     """
@@ -43,18 +43,6 @@ class Launchers:
         from lightpen_app.work.settings import Settings, data_folder, settings_file
 
         return data_folder(Settings(settings_file()).preferences())
-
-    def languages(self) -> tuple[str, ...]:
-        """Return the languages of the program, English first."""
-        from lightpen_resources import languages
-
-        return languages()
-
-    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
-        """Write the calibration report as PDF; return its path."""
-        from lightpen_app.reporting import write_report
-
-        return write_report(result, out, language)
 
 
 def main() -> int:

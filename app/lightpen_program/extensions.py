@@ -13,6 +13,7 @@ from lightpen_app_extensions.discover import DISCOVER
 from lightpen_app_extensions.exports import EXPORTS
 from lightpen_app_extensions.measure import MEASURE
 from lightpen_app_extensions.plant import PLANT
+from lightpen_app_extensions.report import REPORT
 from lightpen_app_extensions.stream import STREAM
 from lightpen_extensions.drivers.extension import DRIVERS
 from lightpen_extensions.simulator.extension import SIMULATOR
@@ -25,6 +26,7 @@ PARTS: tuple[Extension | Faced, ...] = (  # each after what it needs
     DISCOVER,
     EXPORTS,
     PLANT,
+    REPORT,
     STREAM,
 )
 EXTENSIONS = tuple(e.extension if isinstance(e, Faced) else e for e in PARTS)

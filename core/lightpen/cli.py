@@ -22,13 +22,7 @@ from lightpen import __version__
 from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.arguments import use_window
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
-from lightpen.commands.desktop import (
-    Desktop,
-    add_desktop,
-    add_open,
-    add_report,
-    is_absent,
-)
+from lightpen.commands.desktop import Desktop, add_desktop, add_open, is_absent
 from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.extension import Extension, Subcommand
@@ -202,7 +196,6 @@ def _parser(
     if desktop is not None:
         add_desktop(parser, desktop)
         add_open(added("open", "open a recorded swing"), desktop)
-        add_report(added("report", "write the calibration report as PDF"), desktop)
     for each in (*COMMANDS, *(c for e in extensions for c in e.commands)):
         command = added(each.name, each.purpose)
         command.set_defaults(log_folder=usual_data_folder)

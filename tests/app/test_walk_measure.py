@@ -14,8 +14,8 @@ from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import RESULTS, SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
-from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
+from lightpen_app_extensions.report.control import PrintReportWindow
 from lightpen_extensions.measure.measuring.plan_checks import write_plan
 from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART

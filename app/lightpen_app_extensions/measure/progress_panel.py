@@ -17,7 +17,6 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.bars import Question, QuestionBar, ReasonBar, usual_reasons
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
@@ -32,6 +31,7 @@ from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.presenter import VerifyView
 from lightpen_app_extensions.measure.service import VerificationRun
+from lightpen_app_extensions.report.control import PrintReportControl
 from lightpen_extensions.measure.measuring.report import ResultTable, points_table
 from lightpen_extensions.measure.session import SessionSetup, SessionState
 

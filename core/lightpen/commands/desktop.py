@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 
 
@@ -23,12 +22,6 @@ class Desktop(Protocol):
 
     def data_folder(self) -> Path:
         """Return the chosen folder of records, results and archive."""
-
-    def languages(self) -> tuple[str, ...]:
-        """Return the languages of the program, English first."""
-
-    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
-        """Write the calibration report as PDF; return its path."""
 
 
 def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
@@ -59,37 +52,6 @@ def add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         help="record of a swing, the file swing.lightpen in it, or a result; "
         "without it the window opens as usual",
     )
-
-
-def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
-    """Add ``lightpen report``."""
-    parser.set_defaults(run=printing(partial(_report, desktop)))
-    parser.add_argument(
-        "result",
-        type=Path,
-        metavar="RESULT.json",
-        help="accepted result or verification, or record written with --json",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.pdf",
-        help="output file (default: named by pen, tip and date, in this folder)",
-    )
-    languages = desktop.languages()
-    parser.add_argument(
-        "--language",
-        choices=languages,
-        default=languages[0],
-        help=f"language of the report ({languages[0]})",
-    )
-
-
-def _report(desktop: Desktop, options: argparse.Namespace) -> None:
-    if options.out is not None and are_same(options.result, options.out):
-        raise UsageError("cli.report-over-result", out=options.out)
-    path = desktop.write_report(options.result, options.out, options.language)
-    print(shown(f"The record is in {path}."))
 
 
 def _start(desktop: Desktop, options: argparse.Namespace) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,15 +19,15 @@ from lightpen.formats.own_json import file_entry
 from lightpen.model.limits import DueRule, VerificationLimits, rule_in_words
 from lightpen.model.names import Origin
 from lightpen.record.folder import attributed, keep_verification
+from lightpen_app.face import Services, event_text, report_printer
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.history.archive_panel import (
     NOTICE,
     ArchiveControl,
     ArchivePanel,
 )
-from lightpen_app.steps.history.entry_panel import EntryPanel, EventText
+from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import FilterBar, HistoryTable
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
 from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
@@ -72,15 +73,16 @@ class HistoryContent(Translated, QWidget):
 
     checked = Signal()  # the archive was checked
 
-    def __init__(self, workbench: Workbench, kind_of: EventText) -> None:
+    def __init__(self, workbench: Workbench, services: Services) -> None:
         super().__init__()
+        kind_of = partial(event_text, services)
         self._chosen, self._tips = workbench.selection, workbench.library
         self._settings = workbench.settings
         self._notices = workbench.notifications
         self._folder, self._now = workbench.folder, workbench.around.now
         self._logbook = workbench.run.logbook
         self._reader = HistoryReader(self._logbook, self)
-        self._print_report = PrintReportControl(workbench.save_place, self)
+        self._print_report = report_printer(services, workbench.save_place, self)
         self._trend = Trend()
         self._rule = DueRule()
         self._followed: EntryFilter | None = None  # whose trend it is
@@ -129,6 +131,7 @@ class HistoryContent(Translated, QWidget):
         self.table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
         self._entry.report_requested.connect(self._show_report)
+        self._entry.set_has_report(self._print_report.is_here)
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
         self._selection.report_requested.connect(self._report_study)

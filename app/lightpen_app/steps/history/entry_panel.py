@@ -253,6 +253,10 @@ class EntryPanel(Translated, QWidget):
             self.tr("Cancel"),
         )
 
+    def set_has_report(self, has_report: bool) -> None:
+        """Show the button of the report if something can show it."""
+        self._report.setVisible(has_report)
+
     def _request_report(self) -> None:
         if self._line is not None and self._line.entry is not None:
             self.report_requested.emit(self._line.entry)

@@ -1,12 +1,11 @@
 """The step History: the complete history of pens and tips."""
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen_app.face import Services, event_text
+from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.widgets.controls import LazyWidget
 from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
@@ -82,7 +81,7 @@ class HistoryPage(Page):
         # Imported here: with the archive it takes 0.25 s.
         from lightpen_app.steps.history.content import HistoryContent
 
-        content = HistoryContent(self._workbench, partial(event_text, self._services))
+        content = HistoryContent(self._workbench, self._services)
 
         # Connections
         content.checked.connect(self.changed)

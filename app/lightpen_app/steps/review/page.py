@@ -66,7 +66,7 @@ class ReviewPage(Page):
             *(self._run, view, workbench.library, workbench.notifications),
             *(workbench.folder, workbench.around.now),
         )
-        self._along = ResultExport(self._run, place, view.tabs.pictures, self)
+        self._along = ResultExport(self._run, place, view.tabs.pictures, services, self)
 
         # Layout
         vertical_layout(self, view)

@@ -29,11 +29,11 @@ from lightpen.record.exports import (
     exported_solution,
     save_new,
 )
+from lightpen_app.face import Services, report_printer
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import set_tooltip
-from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.controls import open_folder
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import FittedWindow
@@ -187,6 +187,10 @@ class ResultTools(Translated, QWidget):
         words = self.tr("Save results and plots, named by pen, tip and date")
         self._save.set_why_not(why_not, words)
 
+    def set_has_report(self, has_report: bool) -> None:
+        """Show the report if something can show it."""
+        self._report.setVisible(has_report)
+
     def set_report_why_not(self, why_not: str) -> None:
         """Disable the report with a reason, or enable it."""
         self._report.setEnabled(not why_not)
@@ -227,7 +231,12 @@ class ResultExport(QObject):
     failed = Signal(str)  # the sentence why something was not
 
     def __init__(
-        self, run: SwingRun, place: SavePlace, draw_plots: DrawPlots, page: QWidget
+        self,
+        run: SwingRun,
+        place: SavePlace,
+        draw_plots: DrawPlots,
+        services: Services,
+        page: QWidget,
     ) -> None:
         super().__init__(page)
         self._run = run
@@ -235,7 +244,7 @@ class ResultExport(QObject):
         self._draw_plots = draw_plots
         self._page = page
         self._saving: Job | None = None
-        self._print_report = PrintReportControl(place, page)
+        self._print_report = report_printer(services, place, page)
 
         # Connections
         self._print_report.saved.connect(lambda path: self._report_saved(path.parent))
@@ -247,6 +256,7 @@ class ResultExport(QObject):
         tools.copy_requested.connect(self._copy_tip)
         tools.save_requested.connect(self._ask_laboratory)
         tools.report_requested.connect(self._show_report)
+        tools.set_has_report(self._print_report.is_here)
 
     def shut_down(self) -> None:
         """Disconnect from all signals."""

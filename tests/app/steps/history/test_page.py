@@ -53,7 +53,6 @@ from lightpen.record.swings.header import Names
 from lightpen_app.face import Service
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.words import unbroken
-from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -74,6 +73,7 @@ from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.report.control import PrintReportWindow, ReportService
 from lightpen_extensions.plant.server import Replicator
 from lightpen_resources import languages
 
@@ -105,7 +105,8 @@ class Desk:
 
     def __init__(self, workbench: Workbench, qtbot: QtBot) -> None:
         self.workbench, self.qtbot = workbench, qtbot
-        self.page = HistoryPage(workbench, (VerifiedKinds(workbench),))
+        services = VerifiedKinds(workbench), ReportService(workbench)
+        self.page = HistoryPage(workbench, services)
         self.notices: list[str] = []
         self.statuses: list[str] = []
         notifications = workbench.notifications

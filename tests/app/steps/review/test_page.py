@@ -62,7 +62,6 @@ from lightpen.swing.swing_recorder import (
     recorded_setup,
 )
 from lightpen_app.look.theme import Tone, colors_of
-from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
@@ -87,6 +86,7 @@ from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.exports.service import ExportsService
+from lightpen_app_extensions.report.control import PrintReportWindow
 from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.scene_files import write_sample_files

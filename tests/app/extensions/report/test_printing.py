@@ -21,7 +21,7 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind, ListedPen
 from lightpen.record.results.results import Result, TipChange, result_bytes
 from lightpen_app.look.languages import LanguageSwitch, worded
-from lightpen_app.print_report.pages import PrintReport, pdf_of
+from lightpen_app_extensions.report.pages import PrintReport, pdf_of
 
 HASHES = re.compile(r"(?<![A-Za-z0-9])[0-9a-f]+(?![A-Za-z0-9])")  # and parts of them
 

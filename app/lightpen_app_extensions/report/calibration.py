@@ -28,8 +28,8 @@ from lightpen_app.look.words import (
     decimals_for,
     number_text,
 )
-from lightpen_app.print_report.charts import charts_of
-from lightpen_app.print_report.template import (
+from lightpen_app_extensions.report.charts import charts_of
+from lightpen_app_extensions.report.template import (
     ANCHOR,
     Content,
     Piece,

@@ -24,7 +24,7 @@ from lightpen.record.recomputing import reestimate_poses
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.header import Names
 from lightpen_app.look.words import BREAK
-from lightpen_app.print_report.pages import (
+from lightpen_app_extensions.report.pages import (
     PAGE_HEIGHT,
     PAGE_WIDTH,
     PrintReport,

@@ -7,11 +7,11 @@ import pytest
 from PySide6.QtGui import QTextDocument
 
 from lightpen_app.look.words import unbroken
-from lightpen_app.print_report.pages import ROOM, lay_out
-from lightpen_app.print_report.template import Piece, charts, paragraph, table
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import MarkPlot
+from lightpen_app_extensions.report.pages import ROOM, lay_out
+from lightpen_app_extensions.report.template import Piece, charts, paragraph, table
 
 pytestmark = pytest.mark.usefixtures("qapp")
 N_LINES = 44  # paragraphs of a line that fit on a page

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
 from PySide6.QtWidgets import QDialog, QGraphicsView, QWidget
@@ -34,9 +34,9 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.recomputing import ReestimatedPoses, reestimate_poses
 from lightpen.record.swings.header import Names
+from lightpen_app.face import ReportPrinter, Service
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.print_report.pages import A4, PrintReport, paint_on, pdf_of
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.controls import ask_file
 from lightpen_app.widgets.fields import Translated
@@ -44,6 +44,7 @@ from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, LatestJob, Report
+from lightpen_app_extensions.report.pages import A4, PrintReport, paint_on, pdf_of
 
 T = TypeVar("T")
 PATIENCE_MS = 300  # before the progress of saving is shown
@@ -97,11 +98,10 @@ def read_kept_verification(path: Path) -> KeptVerification:
     )
 
 
-class PrintReportControl(QObject):
+class PrintReportControl(ReportPrinter):
     """Reads a file in the background and opens a window with its report."""
 
-    saved = Signal(object)  # Path: the PDF that was written
-    failed = Signal(str)  # the sentence why something is not shown, or was not saved
+    is_here = True
 
     def __init__(self, place: SavePlace, page: QWidget) -> None:
         super().__init__(page)
@@ -109,24 +109,24 @@ class PrintReportControl(QObject):
         self._page = page
         self._reading = LatestJob(self)
 
+    @override
     def show(self, find: Callable[[], Path]) -> None:
-        """Show the report of the file that a function finds on the disk."""
         self._read(lambda: read_calibration_file(find()), self._show)
 
+    @override
     def show_verification(self, path: Path) -> None:
-        """Show the report of a verification."""
         self._read(lambda: read_kept_verification(path), self._show_verification)
 
     def _read(self, read: Callable[[], T], show: Callable[[T], None]) -> None:
         self._reading.start(lambda _: read(), show, self.failed)
 
+    @override
     def shut_down(self) -> None:
-        """Cancel previews that are not shown yet."""
         self._reading.cancel()
 
     def _show(self, found: ReportContent) -> None:
         # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app.print_report.pages import print_report_of, report_stem
+        from lightpen_app_extensions.report.pages import print_report_of, report_stem
 
         report = print_report_of(
             found.calibration_file,
@@ -137,7 +137,7 @@ class PrintReportControl(QObject):
         self._open(report, report_stem(found.calibration_file))
 
     def _show_verification(self, found: KeptVerification) -> None:
-        from lightpen_app.print_report.verification import (
+        from lightpen_app_extensions.report.verification import (
             verification_print_report,
             verification_stem,
         )
@@ -152,6 +152,12 @@ class PrintReportControl(QObject):
         window.saved.connect(self.saved)
         window.failed.connect(self.failed)
         window.show()
+
+
+class ReportService(Service):
+    """Shows reports for the steps Review and History."""
+
+    report_printer = PrintReportControl
 
 
 class PrintReportWindow(FittedWindow, Translated, QWidget):

@@ -48,8 +48,8 @@ from lightpen.record.recomputing import ReestimatedPoses
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.look.words import BREAK
-from lightpen_app.print_report.calibration import calibration_parts, status_words
-from lightpen_app.print_report.template import (
+from lightpen_app_extensions.report.calibration import calibration_parts, status_words
+from lightpen_app_extensions.report.template import (
     ANCHOR,
     MM,
     REPORTS,

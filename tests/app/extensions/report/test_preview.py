@@ -15,11 +15,16 @@ from shiboken6 import isValid
 from tests.app.patience import PATIENCE_MS
 
 from lightpen.record.results.results import Result
-from lightpen_app.print_report.control import PrintReportWindow
-from lightpen_app.print_report.pages import PrintReport, lay_out, paint_on, paint_page
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.report.control import PrintReportWindow
+from lightpen_app_extensions.report.pages import (
+    PrintReport,
+    lay_out,
+    paint_on,
+    paint_page,
+)
 
 
 @pytest.fixture
@@ -127,7 +132,7 @@ def test_saving_that_is_cancelled_leaves_the_file_as_it_was(
             painted.set()
             may_go_on.wait()
 
-    monkeypatch.setattr("lightpen_app.print_report.pages.paint_page", paint_slowly)
+    monkeypatch.setattr("lightpen_app_extensions.report.pages.paint_page", paint_slowly)
     path = tmp_path / "saved" / "record.pdf"
     path.parent.mkdir()
     path.write_text("as before")

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from lightpen_app.look.languages import own_name
-from lightpen_app.print_report import template
-from lightpen_app.print_report.template import (
+from lightpen_app_extensions.report import template
+from lightpen_app_extensions.report.template import (
     FIELD,
     REPORTS,
     SECTION,

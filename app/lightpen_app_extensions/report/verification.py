@@ -21,8 +21,10 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen_app.look.languages import worded
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.words import number_text
-from lightpen_app.print_report.pages import Margins, PrintReport
-from lightpen_app.print_report.template import (
+from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.result_plots import ArrowPlot
+from lightpen_app_extensions.report.pages import Margins, PrintReport
+from lightpen_app_extensions.report.template import (
     Content,
     Piece,
     condition,
@@ -38,8 +40,6 @@ from lightpen_app.print_report.template import (
     traced_rows,
     zoned_moment_text,
 )
-from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.result_plots import ArrowPlot
 
 translate = QCoreApplication.translate
 

@@ -13,12 +13,12 @@ from lightpen.record.folder import is_verification
 from lightpen_app.application import has_display, make_application
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import load_fonts
-from lightpen_app.print_report.control import (
+from lightpen_app.work.settings import Settings, settings_file
+from lightpen_app_extensions.report.control import (
     read_calibration_file,
     read_kept_verification,
 )
-from lightpen_app.print_report.pages import pdf_of, print_report_of, report_stem
-from lightpen_app.work.settings import Settings, settings_file
+from lightpen_app_extensions.report.pages import pdf_of, print_report_of, report_stem
 
 
 def write_report(result: Path, out: Path | None, language: str) -> Path:
@@ -39,7 +39,7 @@ def write_report(result: Path, out: Path | None, language: str) -> Path:
 
 def _write_verification(file: Path, out: Path | None, language: str) -> Path:
     # Few reports are of one.
-    from lightpen_app.print_report.verification import (
+    from lightpen_app_extensions.report.verification import (
         verification_print_report,
         verification_stem,
     )

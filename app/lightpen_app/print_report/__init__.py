@@ -1,1 +1,0 @@
-"""The calibration report: text, pages, print and PDF."""
