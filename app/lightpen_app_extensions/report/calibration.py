@@ -17,7 +17,6 @@ from lightpen.record.calibrations import (
     decision_rule,
 )
 from lightpen.record.library.entered_files import EntryPlace
-from lightpen.record.recomputing import ReestimatedPoses
 from lightpen.record.results.results import TipChange
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.phrases import grade_text, origin_text, reason_text, share_text
@@ -29,6 +28,7 @@ from lightpen_app.look.words import (
     number_text,
 )
 from lightpen_app_extensions.report.charts import charts_of
+from lightpen_app_extensions.report.reestimated import ReestimatedPoses
 from lightpen_app_extensions.report.template import (
     ANCHOR,
     Content,

@@ -4,11 +4,9 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.record.recomputing import ReestimatedPoses
 from lightpen_app.look.figures import budget_figure
-from lightpen_app.look.words import AXES, MICROMETRES
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.plots import Curve, TracePlot
+from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import (
     ArrowPlot,
     BarPlot,
@@ -16,11 +14,11 @@ from lightpen_app.widgets.result_plots import (
     MarkPlot,
     PosturePlot,
 )
+from lightpen_app_extensions.report.reestimated import ReestimatedPoses
 
 translate = QCoreApplication.translate
 
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
-STEADY = 8.0  # times the last U, beyond which a tip by few images is left out
 
 
 def charts_of(
@@ -37,9 +35,7 @@ def charts_of(
     }
     if reestimated is None:
         return plots
-    limit = calibration.verdict.limits.max_uncertainty_mm
     return plots | {
-        "certainty": _certainty(reestimated, limit),
         "postures": _postures(reestimated),
         "residuals": _residuals(reestimated),
     }
@@ -91,22 +87,6 @@ def _budget(calibration: CalibrationRecord) -> Figure:
             calibration.verdict.limits.max_uncertainty_mm,
         )
     )
-    return plot
-
-
-def _certainty(reestimated: ReestimatedPoses, limit: float) -> Figure:
-    """Return U (k = 2) over the number of images, with its limit, mm.
-
-    Tips by few images are left out until they are certain enough to draw.
-    """
-    worst = reestimated.uncertainties.max(axis=1)
-    steady = worst <= STEADY * worst[-1]
-    title = translate("paper", "U (k = 2) from the first n images / µm")
-    curves = [Curve(axis, axis) for axis in AXES]
-    plot = TracePlot(Axes(title, _image_number()), curves, y_zero=True)
-    plot.set_limit(MICROMETRES * limit)
-    numbers = reestimated.numbers[steady].astype(np.float64)
-    plot.set_data(numbers, *(MICROMETRES * reestimated.uncertainties[steady]).T)
     return plot
 
 

@@ -32,7 +32,6 @@ from lightpen.record.folder import (
 )
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import Library, read_library
-from lightpen.record.recomputing import ReestimatedPoses, reestimate_poses
 from lightpen.record.swings.header import Names
 from lightpen_app.face import ReportPrinter, Service
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
@@ -45,6 +44,10 @@ from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app_extensions.report.pages import A4, PrintReport, paint_on, pdf_of
+from lightpen_app_extensions.report.reestimated import (
+    ReestimatedPoses,
+    reestimate_poses,
+)
 
 T = TypeVar("T")
 PATIENCE_MS = 300  # before the progress of saving is shown

@@ -44,11 +44,11 @@ from lightpen.model.names import Laboratory, Origin
 from lightpen.record.calibrations import CalibrationFile
 from lightpen.record.exports import export_stem
 from lightpen.record.library.entered_files import EntryPlace
-from lightpen.record.recomputing import ReestimatedPoses
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.look.words import BREAK
 from lightpen_app_extensions.report.calibration import calibration_parts, status_words
+from lightpen_app_extensions.report.reestimated import ReestimatedPoses
 from lightpen_app_extensions.report.template import (
     ANCHOR,
     MM,

@@ -9152,10 +9152,6 @@ needed</source>
         <translation>各 LED 的残差 / px</translation>
     </message>
     <message>
-        <source>U (k = 2) from the first n images / µm</source>
-        <translation>由前 n 幅图像得到的 U (k = 2) / µm</translation>
-    </message>
-    <message>
         <source>LED</source>
         <translation>LED</translation>
     </message>

@@ -20,7 +20,6 @@ from lightpen.messages import Code, message
 from lightpen.model.names import Laboratory, Origin
 from lightpen.record.calibrations import TracedItem, read_calibration
 from lightpen.record.library.entered_files import EntryPlace
-from lightpen.record.recomputing import reestimate_poses
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.header import Names
 from lightpen_app.look.words import BREAK
@@ -32,6 +31,7 @@ from lightpen_app_extensions.report.pages import (
     paint_page,
     print_report_of,
 )
+from lightpen_app_extensions.report.reestimated import reestimate_poses
 
 SVG = "{http://www.w3.org/2000/svg}text"
 

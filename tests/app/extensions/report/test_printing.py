@@ -251,7 +251,7 @@ def test_it_is_whole_without_the_curves_where_the_file_does_not_hold_enough(
     reported = " ".join(" ".join(page) for page in words(printed(other)))
 
     assert (
-        "U over the images, postures and residuals are plotted only for one camera "
+        "Postures and residuals are plotted only for one camera "
         "and one cone, and for complete files."
     ) in reported
     assert "End of report" in reported
