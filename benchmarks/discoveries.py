@@ -15,6 +15,7 @@ from tests.simulated_stations import (
     EXACT,
     Station,
     errors_of,
+    numbers_of,
     random_station,
     seen_again,
 )
@@ -30,7 +31,6 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.hypotheses import number_by_sketch
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import find_spots
 from lightpen_extensions.simulator.image_plans import plan_scene
@@ -245,7 +245,7 @@ def rendered_error(looks_and_seed: tuple[str, int]) -> tuple[float, float]:
     longest = float(np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2).max())
     request = Request((MeasuredLength(None, longest, EXACT),), pen.diameter)
     found = discover(find_spots(rendered(plan_scene(scene))), request)
-    order = number_by_sketch(found.pen.leds, pen.leds)
+    order = numbers_of(found.pen.leds, pen.leds)
     R, t = fit_rigid(pen.leds, found.pen.leds[order])
     off = found.tip_pen - (R @ scene.tip_pen + t)
     share = float(np.abs(off / found.expanded_uncertainty).max())

@@ -1,16 +1,17 @@
 """Random stations without any file: what a camera sees of a swing of a pen."""
 
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.hypotheses import number_by_sketch
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import Sightings, sightings_of_centers
 from lightpen_extensions.simulator.swings import (
@@ -180,9 +181,34 @@ class Errors:
         return float(np.sqrt(np.mean(np.sum(self.leds**2, axis=1))))
 
 
+def numbers_of(leds: FloatArray, known: FloatArray) -> IntArray:
+    """Return the LEDs (L, 3), in any frame, in the order of known ones (L, 3)."""
+    apart = np.linalg.norm(known[:, None] - known, axis=2)
+    first, second = np.unravel_index(np.argmax(apart), apart.shape)
+    off_line = np.cross(known - known[first], known[second] - known[first])
+    third = np.argmax(np.linalg.norm(off_line, axis=1))
+    corners = [int(first), int(second), int(third)]
+    triples = np.array(list(permutations(range(len(leds)), 3)))
+    sides = [
+        np.linalg.norm(each - np.roll(each, 1, axis=-2), axis=-1)
+        for each in (leds[triples], known[corners])
+    ]
+    near = np.abs(sides[0] - sides[1]).max(axis=1) < 0.2 * apart.max()
+    best, order = np.inf, np.arange(len(known))
+    for triple in triples[near]:
+        R, t = fit_rigid(leds[triple], known[corners])
+        gaps = np.linalg.norm(known[:, None] - leds @ R.T - t, axis=2)
+        match = linear_sum_assignment(gaps**2)[1]
+        R, t = fit_rigid(leds[match], known)
+        misfit = float(np.sum((leds[match] @ R.T + t - known) ** 2))
+        if misfit < best:
+            best, order = misfit, match
+    return order
+
+
 def errors_of(found: Discovery, station: Station) -> Errors:
     """Compare a discovery with the truth."""
-    order = number_by_sketch(found.pen.leds, station.pen.leds)
+    order = numbers_of(found.pen.leds, station.pen.leds)
     leds = found.pen.leds[order]
     R, t = fit_rigid(station.pen.leds, leds)
     return Errors(

@@ -12,7 +12,6 @@ from lightpen.commands.arguments import (
     add_camera,
     add_file,
     add_json,
-    finite,
 )
 from lightpen.commands.console import (
     are_same,
@@ -26,10 +25,10 @@ from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import require_folder_of
 from lightpen.formats.observation_files import read_unlabelled_centers
-from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera
-from lightpen.model.pen import DISC_DIAMETER, Pen, check_leds
+from lightpen.model.pen import DISC_DIAMETER, check_leds
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import require_lens
 from lightpen_extensions.discover.report import discovery_record, discovery_text
@@ -87,20 +86,11 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--led-diameter",
         type=above_zero,
+        default=DISC_DIAMETER,
         metavar="MM",
         help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
     add_camera(parser, "intrinsics file, if there is one")
-    rough = parser.add_mutually_exclusive_group()
-    rough.add_argument(
-        "--pen-sketch",
-        type=Path,
-        metavar="FILE",
-        help="LED file with rough coordinates, which gives numbers and frame",
-    )
-    rough.add_argument(
-        "--pen", type=Path, metavar="FILE", help="the same as --pen-sketch"
-    )
     for name, what in (("pen", "LED file"), ("camera", "intrinsics file")):
         suffix = "json" if name == "pen" else "yaml"
         add_file(parser, f"--out-{name}", f"FILE.{suffix}", f"write the {what}")
@@ -125,12 +115,10 @@ def _discover(options: argparse.Namespace) -> None:
     if not lengths and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
-    rough = options.pen_sketch or options.pen
-    sketch = None if rough is None else read_unchecked_pen(rough, "mm")
     _check_outputs(options)
     if bool(options.images) == bool(options.centers):
         raise UsageError("cli.discover-images-or-centers")
-    request = Request(lengths, _diameter(options, sketch), camera, sketch)
+    request = Request(lengths, options.led_diameter, camera)
     with progress("Finding pen and camera") as report:
         share = 0.0 if options.centers else SEARCHING
         sightings = _sightings(options, camera, partial(_report_part, report, 0, share))
@@ -164,15 +152,9 @@ def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
     raise UsageError("cli.discover-length-words", words=" ".join(words))
 
 
-def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
-    if options.led_diameter is not None:
-        return float(finite(str(options.led_diameter)))
-    return DISC_DIAMETER if sketch is None else sketch.diameter
-
-
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs in no folder, over an input or each other, or of other suffix."""
-    inputs = (options.centers, options.camera, options.pen, options.pen_sketch)
+    inputs = (options.centers, options.camera)
     seen: list[Path] = []
     outputs = (options.out_pen, options.out_camera, options.json)
     for path in outputs:

@@ -31,7 +31,6 @@ from lightpen_extensions.discover.found import (
     require_length,
     require_no_second_pen,
     require_one_camera,
-    require_sketched,
 )
 from lightpen_extensions.discover.hypotheses import (
     Hypothesis,
@@ -96,7 +95,7 @@ def discover(
     `CalibrationError` if the images do not determine them.
     """
     swing = _labelled_swing(sightings, request, report)
-    swing = replace(swing, found=numbered(swing.found, request))
+    swing = replace(swing, found=numbered(swing.found))
     report(0.5)
     return _adjusted(swing, request, report)
 
@@ -116,8 +115,6 @@ def _adjusted(
     sightings = swing.sightings
     pixels = pixels_of(swing.found.spots, swing.centers)
     scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
-    if request.sketch is not None and request.lengths:
-        require_sketched(lengths, request.sketch)
     halves = partial(adjust_halves, scaled, pixels[swing.found.images])
     try:
         require_one_camera(halves(request.camera))
@@ -154,8 +151,7 @@ def _adjusted(
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
-        *(calibration, choice, lengths, request.rough_leds),
-        is_relative=request.is_relative,
+        *(calibration, choice, lengths), is_relative=request.is_relative
     )
     try:
         require_certain(discovery, sightings)

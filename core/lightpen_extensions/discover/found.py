@@ -31,12 +31,11 @@ from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.hypotheses import Hypothesis, frame_by, framed
 from lightpen_extensions.discover.labelling import Labelled
 from lightpen_extensions.discover.scale import (
-    CONTRADICTING,
     Request,
     nearest_pair,
     with_led_covariance,
 )
-from lightpen_extensions.discover.starts import FACING, KnownLength, gradient_of
+from lightpen_extensions.discover.starts import FACING, KnownLength
 from lightpen_extensions.discover.tracks import Sightings
 
 
@@ -93,14 +92,12 @@ def discovery_of(
     calibration: Calibration,
     choice: Choice | None,
     lengths: tuple[KnownLength, ...],
-    sketch: FloatArray | None,
     *,
     is_relative: bool,
 ) -> Discovery:
     """Return the result of a calibration with wide priors.
 
-    ``choice`` is the choice of the lens model, None for a known camera; ``sketch`` (L,
-    3), mm, are rough LEDs in the frame that the pen gets.
+    ``choice`` is the choice of the lens model, None for a known camera.
     """
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen
@@ -131,7 +128,7 @@ def discovery_of(
         expansion=None,
         found=FoundPen(marks, before.diameter, before.led_covariance),
     )
-    _, R, t = framed(pen, tip, sketch)
+    _, R, t = framed(pen, tip)
     found = Discovery(
         pen=pen,
         camera=camera,
@@ -249,7 +246,6 @@ ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
 HALVES_APART = 6.0  # standard deviations of the difference
 HALVES_MISFIT = 3.0  # times the noise of either half alone
 MOST_USED = 0.7  # of the images that show LEDs enough
-ROUGHLY = 2.5  # mm, standard deviation of a sketch accurate to 5 mm
 OTHERWISE_WARM = 2e-4  # relative, of a length: 10 K of aluminium
 WORST_TIP, WORST_FOCAL = 0.02, 0.03  # U over the pen's size, and relative
 
@@ -323,29 +319,6 @@ def require_one_camera(halves: Halves) -> None:
         raise CalibrationError("discover.camera-changed", first=first, second=second)
     if halves.misfit > HALVES_MISFIT:
         raise CalibrationError("discover.halves-apart", times=halves.misfit)
-
-
-def require_sketched(lengths: Sequence[KnownLength], sketch: Pen) -> None:
-    """Refuse lengths that the sketch of the pen contradicts."""
-    for each in lengths:
-        row = gradient_of(sketch.leds, each)
-        sketched = each.between(sketch.leds)
-        if sketch.led_covariance is not None:
-            variance = float(row @ sketch.led_covariance @ row)
-        elif sketch.led_sigma is not None:
-            variance = 2 * sketch.led_sigma**2
-        else:
-            variance = 2 * ROUGHLY**2
-        sigma = np.sqrt(variance + each.sigma**2 + (OTHERWISE_WARM * sketched) ** 2)
-        sigma = np.hypot(sigma, (sketch.scale_sigma or 0.0) * sketched)
-        if abs(each.length - sketched) > CONTRADICTING * sigma:
-            raise CalibrationError(
-                "discover.length-not-sketched",
-                length=each.length,
-                first=each.first + 1,
-                second=each.second + 1,
-                sketched=sketched,
-            )
 
 
 def require_certain(discovery: Discovery, sightings: Sightings) -> None:

@@ -6,7 +6,6 @@ same tracks. Perspective distinguishes them: the wrong one fits hundreds of time
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 
 import numpy as np
 
@@ -349,7 +348,6 @@ def _best_part(pieces: Pieces) -> tuple[IntArray, IntArray]:
 
 
 ROW = 0.02  # of the pen's size: LEDs of one row differ less in height
-SKETCHED = 0.1  # of the pen's size: LEDs are nearer to a sketch
 
 
 def number_by_place(state: BundleState) -> IntArray:
@@ -372,50 +370,15 @@ def number_by_place(state: BundleState) -> IntArray:
     return np.asarray(order[np.lexsort((places[order], rows))])
 
 
-def number_by_sketch(leds: FloatArray, sketch: FloatArray) -> IntArray:
-    """Return the LEDs (L, 3) in the order of a sketch (L, 3), roughly, mm.
-
-    They are in any right-handed frame and to any scale. Raises `CalibrationError` if
-    their numbers differ, or they do not resemble the sketch.
-    """
-    n = len(sketch)
-    if len(leds) != n:
-        raise CalibrationError("discover.sketch-count", n_found=len(leds), n_sketched=n)
-    size = _extent(sketch)
-    scaled = leds * (size / _extent(leds))
-    # Three LEDs that span the sketch fix how it lies for each three that are found.
-    first, second = np.unravel_index(np.argmax(_distances(sketch)), (n, n))
-    along = sketch[second] - sketch[first]
-    off_line = np.cross(sketch - sketch[first], along / np.linalg.norm(along))
-    third = int(np.argmax(np.linalg.norm(off_line, axis=1)))
-    corners = [int(first), int(second), third]
-    triples = np.array(list(permutations(range(n), 3)))
-    sides = _sides(scaled[triples]) - _sides(sketch[corners])
-    triples = triples[np.abs(sides).max(axis=1) < 2 * SKETCHED * size]
-    best, order = np.inf, np.arange(n)
-    for triple in triples:
-        R, t = fit_rigid(scaled[triple], sketch[corners])
-        match, misfit = _matched(scaled @ R.T + t, sketch)
-        if misfit < best:
-            best, order = misfit, match
-    if best > SKETCHED * size:
-        raise CalibrationError("discover.other-sketch")
-    return order
-
-
-def framed(
-    pen: Pen, tip: FloatArray, sketch: FloatArray | None
-) -> tuple[Pen, FloatArray, FloatArray]:
+def framed(pen: Pen, tip: FloatArray) -> tuple[Pen, FloatArray, FloatArray]:
     """Return a numbered pen in its frame, and R, t that brought it there.
 
-    The frame is the sketch's if there is one, and the paper's for a pen of its layout.
-    Otherwise LED 1 is the origin, y runs to the last LED, and z, at right angles to it,
-    is next to the normal of the discs. Tip (3,) and sketch (L, 3) are in mm.
+    The frame is the paper's for a pen of its layout. Otherwise LED 1 is the origin, y
+    runs to the last LED, and z, at right angles to it, is next to the normal of the
+    discs. The tip (3,) is in mm.
     """
     leds = pen.leds
-    if sketch is not None:
-        R, t = fit_rigid(leds, sketch)
-    elif order_of_paper(leds, leds.mean(axis=0) - tip) is not None:
+    if order_of_paper(leds, leds.mean(axis=0) - tip) is not None:
         R, t = pen_frame_from_raw(leds)
     else:
         R, t = frame_by(pen, 0, len(leds) - 1)
@@ -436,29 +399,3 @@ def frame_by(pen: Pen, origin: int, along: int) -> tuple[FloatArray, FloatArray]
 
 def _normalised(vector: FloatArray) -> FloatArray:
     return np.asarray(vector / np.linalg.norm(vector))
-
-
-def _distances(points: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(points[:, None] - points, axis=2))
-
-
-def _extent(points: FloatArray) -> float:
-    return float(_distances(points).max())
-
-
-def _sides(triples: FloatArray) -> FloatArray:
-    """Return the sides of triangles (..., 3, 3), (..., 3)."""
-    return np.asarray(np.linalg.norm(triples - np.roll(triples, 1, axis=-2), axis=-1))
-
-
-def _matched(points: FloatArray, sketch: FloatArray) -> tuple[IntArray, float]:
-    """Return the point of each of the sketch, and the rms distance after a fit, mm."""
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s
-
-    for _ in range(2):
-        apart = np.linalg.norm(sketch[:, None] - points, axis=2)
-        _, match = linear_sum_assignment(apart**2)
-        R, t = fit_rigid(points[match], sketch)
-        points = points @ R.T + t
-    misses = np.linalg.norm(points[match] - sketch, axis=1)
-    return np.asarray(match), float(np.sqrt(np.mean(misses**2)))

@@ -136,14 +136,8 @@ class Request:
     lengths: tuple[MeasuredLength, ...]  # none: the largest distance is `RELATIVE`
     diameter: float  # of the LED discs, mm
     camera: Camera | None = None  # of a camera file, with its covariance
-    sketch: Pen | None = None  # rough LEDs, which give numbers and frame
 
     @property
     def is_relative(self) -> bool:
         """Whether nothing gives the scale."""
         return not self.lengths
-
-    @property
-    def rough_leds(self) -> FloatArray | None:
-        """LEDs of the sketch, (L, 3), mm."""
-        return None if self.sketch is None else self.sketch.leds

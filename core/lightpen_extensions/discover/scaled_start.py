@@ -20,7 +20,6 @@ from lightpen_extensions.discover.hypotheses import (
     camera_prior,
     framed,
     number_by_place,
-    number_by_sketch,
 )
 from lightpen_extensions.discover.labelling import Labelled
 from lightpen_extensions.discover.scale import (
@@ -207,7 +206,7 @@ class ScaledStart(NamedTuple):
     choice: Choice | None  # why this lens model; None where the camera is known
 
 
-def numbered(found: Labelled, request: Request) -> Labelled:
+def numbered(found: Labelled) -> Labelled:
     """Return the labelling by LED numbers.
 
     Without LEDs that hardly any image shows, and without the reflections of others.
@@ -223,11 +222,7 @@ def numbered(found: Labelled, request: Request) -> Labelled:
             "discover.too-few-leds", n_leds=len(good), needed=MIN_LEDS
         )
     state = _of_leds(found.state, good)
-    order = (
-        number_by_place(state)
-        if request.sketch is None
-        else number_by_sketch(state.pen.leds, request.sketch.leds)
-    )
+    order = number_by_place(state)
     return replace(
         found, state=_of_leds(state, order), spots=found.spots[:, good[order]]
     )
@@ -276,7 +271,7 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
     every = replace(part, rotations=state.rotations @ turned.T)
     prior = camera_prior(part.rig.cameras[0], known)
     every = adjust_start(every, pixels, prior, 40, lengths).state
-    pen, R, t = framed(every.pen, every.tip_pen, request.rough_leds)
+    pen, R, t = framed(every.pen, every.tip_pen)
     tip, rotations = R @ every.tip_pen + t, every.rotations @ R.T
     every = replace(every, pen=pen, tip_pen=tip, rotations=rotations)
     return ScaledStart(every, lengths, choice)

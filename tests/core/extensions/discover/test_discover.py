@@ -17,11 +17,10 @@ from lightpen.errors import CalibrationError
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen_extensions.discover import hypotheses
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.found import Discovery, require_sketched
+from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.hypotheses import require_one_focal_length
 from lightpen_extensions.discover.report import discovery_text
 from lightpen_extensions.discover.scale import MeasuredLength, Request
-from lightpen_extensions.discover.starts import KnownLength
 from lightpen_extensions.discover.tracks import Pieces, Sightings, sightings_of_centers
 from lightpen_extensions.simulator.swings import swing_from_postures
 
@@ -86,22 +85,6 @@ def test_leds_are_numbered_from_the_tip_upwards(found: Discovery) -> None:
     assert heights[0] > found.tip_pen[1]
     np.testing.assert_allclose(found.pen.leds[0], 0, atol=1e-9)
     np.testing.assert_allclose(found.pen.leds[-1, [0, 2]], 0, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_a_sketch_gives_numbers_and_frame() -> None:
-    rng = np.random.default_rng(1)
-    order = rng.permutation(STATION.pen.n_leds)
-    rough = STATION.pen.leds[order] + 2 * rng.standard_normal((len(order), 3))
-    sketch = replace(STATION.pen, leds=rough)
-    request = replace(STATION.request, sketch=sketch)
-
-    found = discover(STATION.sightings, request)
-
-    assert np.abs(found.pen.leds - rough).max() < 8
-    assert np.abs(found.pen.leds - STATION.pen.leds[order]).max() < 8
-    tip = STATION.swing.tip_pen
-    assert np.linalg.norm(found.tip_pen - tip) < 8
 
 
 @pytest.mark.slow
@@ -302,18 +285,6 @@ def test_halves_that_do_not_fit_together_are_refused() -> None:
         return [*centers[: N // 2], *later]
 
     assert refused(with_centers(station, zoomed), station) == "discover.halves-apart"
-
-
-def test_a_length_that_the_sketch_contradicts_is_refused() -> None:
-    leds = SHORT.pen.leds
-    rough = replace(SHORT.pen, leds=leds + 0.5)
-    exact = replace(rough, led_covariance=1e-4 * np.eye(leds.size), scale_sigma=1e-5)
-    apart = float(np.linalg.norm(leds[1] - leds[0]))
-
-    for sketch, wrong, right in ((rough, 20.0, 5.0), (exact, 0.2, 0.02)):
-        require_sketched([KnownLength(0, 1, apart + right, 0.01)], sketch)
-        with pytest.raises(CalibrationError, match="file of the pen their distance"):
-            require_sketched([KnownLength(0, 1, apart + wrong, 0.01)], sketch)
 
 
 @pytest.mark.slow
