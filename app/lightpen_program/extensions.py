@@ -15,12 +15,14 @@ from lightpen_app_extensions.measure import MEASURE
 from lightpen_app_extensions.plant import PLANT
 from lightpen_app_extensions.report import REPORT
 from lightpen_app_extensions.stream import STREAM
+from lightpen_extensions.comparisons.extension import COMPARISONS
 from lightpen_extensions.drivers.extension import DRIVERS
 from lightpen_extensions.simulator.extension import SIMULATOR
 
 PARTS: tuple[Extension | Faced, ...] = (  # each after what it needs
     SIMULATOR,
     DRIVERS,
+    COMPARISONS,
     MEASURE,
     BOARDS,
     DISCOVER,

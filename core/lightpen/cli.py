@@ -45,16 +45,6 @@ COMMANDS = (
         "transform measured LED coordinates into the pen frame",
         "lightpen.commands.pen:add_pen",
     ),
-    Subcommand(
-        "repeatability",
-        "compare calibrations of one tip",
-        "lightpen.commands.repeatability:add_repeatability",
-    ),
-    Subcommand(
-        "recalculate",
-        "recompute calibrations and check U by Monte Carlo",
-        "lightpen.commands.recalculate:add_recalculate",
-    ),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -66,7 +56,6 @@ ADVICE = {
     "pen.too-large": "Name them so: --units um.",
     "pen.too-small": "Name them so: --units m.",
     "pen.not-in-frame": "That is done by: lightpen pen RAW.csv OUT.csv.",
-    "pen.neither-framed-nor-handed": "That is done by: lightpen pen RAW.csv OUT.csv.",
     "images.other-size": "Binned or cropped: --binning 2, --roi 0 0 640 480.",
     "images.ambiguous": "They are given by --centers FILE.csv.",
 }

@@ -8,7 +8,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.comparisons.pen_health import PenHealth, PenOverTime, read_pen_over_time
 from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.artefacts import Artefact
@@ -30,6 +29,11 @@ from lightpen_app_extensions.measure.plan_panel import choose_plan
 from lightpen_app_extensions.measure.presenter import VerifyPresenter
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.comparisons.pen_health import (
+    PenHealth,
+    PenOverTime,
+    read_pen_over_time,
+)
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 
 LATEST = 8  # swings; the table has room for as many

@@ -6,26 +6,20 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from lightpen.commands.console import note
 from lightpen.errors import UsageError
 from lightpen.formats.pen_tables import UNITS
 from lightpen.formats.rig_files import write_window
 from lightpen.messages import message
-from lightpen.model.coverage import DecisionRule
-from lightpen.model.limits import BALL_UNCERTAINTY, COLDEST, LIMITS, WARMEST
+from lightpen.model.limits import COLDEST, WARMEST
 from lightpen.record.library.supervision import Signature
 
 DataFolder: TypeAlias = Callable[[], Path]
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
-RULE_WORDS = {
-    "simple": DecisionRule.SIMPLE,
-    "guard-band": DecisionRule.GUARD_BAND,
-    "risk": DecisionRule.RISK,
-}
 
 
 def whole_number(text: str) -> int:
@@ -215,72 +209,6 @@ def add_conditions(
         type=number_from(0.0, 100.0, "relative humidity", "%"),
         metavar="PERCENT",
         help="relative humidity, for the record",
-    )
-
-
-def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
-    """Add options for fields of `VerificationLimits`; `chosen_limits` reads them."""
-    parser.set_defaults(limits=names)
-    for limit in LIMITS:
-        if limit.part == "verification" and limit.name in names:
-            parser.add_argument(
-                f"--limit-{limit.name.replace('_', '-')}",
-                type=above_zero if limit.range[0] else not_negative,
-                metavar=limit.unit.upper(),
-                help=f"{limit.label} ({limit.default:g})",
-            )
-
-
-def chosen_limits(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the limits and the decision rule that are given, by their names."""
-    given = {
-        name: getattr(options, f"limit_{name}", None)
-        for name in getattr(options, "limits", ())
-    }
-    rule = getattr(options, "decision_rule", None)
-    given["rule"] = None if rule is None else RULE_WORDS[rule]
-    given["risk"] = getattr(options, "max_risk", None)
-    return {name: value for name, value in given.items() if value is not None}
-
-
-def add_verdict(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the verdict and its output; see `chosen_limits`."""
-    parser.add_argument(
-        "--decision-rule",
-        choices=tuple(RULE_WORDS),
-        help="how a value with U is compared with its limit: simple acceptance, guard "
-        "band (ISO 14253-1), or risk (JCGM 106)",
-    )
-    parser.add_argument(
-        "--max-risk",
-        type=number_from(0.1, 50.0, "risk", "%"),
-        metavar="PERCENT",
-        help="risk of a wrong decision by --decision-rule risk (5)",
-    )
-    add_exit_by_verdict(parser)
-
-
-def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
-    """Add the exit status by the verdict; `verdict_status` returns it."""
-    parser.add_argument(
-        "--exit-by-verdict",
-        action="store_true",
-        help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
-        "if it is CHECK (not proven), 5 if it passes but does not verify the tip",
-    )
-
-
-def add_ball(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """Add the options of the ball."""
-    parser.add_argument(
-        "--ball-diameter", type=not_negative, metavar="MM", help=meaning
-    )
-    parser.add_argument(
-        "--ball-uncertainty",
-        type=not_negative,
-        default=BALL_UNCERTAINTY,
-        metavar="MM",
-        help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
     )
 
 

@@ -3,12 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.pen_health import Growth, PenHealth
-from lightpen.comparisons.press_test import PressTest
 from lightpen.comparisons.repeatability import Repeatability
 from lightpen.formats.own_json import plain, record_heading
 from lightpen.local_time import local_now
@@ -80,27 +76,6 @@ def repeatability_entries(found: Repeatability) -> dict[str, Any]:
     }
 
 
-def pen_health_entries(found: PenHealth) -> dict[str, Any]:
-    """Return the entries of a pen's history."""
-    return {
-        "moved_leds": found.moved,
-        **_growth_entries(found.growth),
-        "swings": [
-            {
-                "name": swing.name,
-                "shifts_mm": swing.shifts,
-                **_growth_entries(swing.growth),
-            }
-            for swing in found.swings
-        ],
-    }
-
-
-def _growth_entries(found: Growth | None) -> dict[str, float | None]:
-    relative, uncertainty = found or (None, None)
-    return {"growth": relative, "growth_expanded_uncertainty": uncertainty}
-
-
 # Comparisons of calibrations as text for the screen, in the tables of the paper.
 #
 # [1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system - probe
@@ -139,41 +114,6 @@ def repeatability_text(
     if out:
         lines.append("Out of control: " + ", ".join(tip.name for tip in out))
     return "\n".join([*lines, "", *verdict_lines(found.assessment, rule)])
-
-
-def pen_health_text(found: PenHealth) -> str:
-    """Return a pen over its swings as text."""
-    n_leds = len(found.swings[0].shifts)
-    lines = [
-        "LEDs since the first swing, mm, and size of the pen, ppm",
-        f"{'Swing':<{TITLE}}"
-        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
-        + f"{'size':>{COLUMN}}{'U':>{COLUMN}}",
-    ]
-    for swing in found.swings:
-        lengths = np.linalg.norm(swing.shifts, axis=1)
-        cells = "".join(
-            f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
-            for x in lengths
-        )
-        size = "".join(
-            f"{'-' if ppm is None else format(1e6 * ppm, '+.0f'):>{COLUMN}}"
-            for ppm in swing.growth or (None, None)
-        )
-        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
-    by_rule = verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)
-    return "\n".join([*lines, "", *by_rule])
-
-
-def press_test_text(found: PressTest) -> str:
-    """Return the change by firm pressure as text."""
-    names = ("Tip x", "Tip y (along pen)", "Tip z")
-    lines = [f"{'Firm less light, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
-    for name, *values in zip(names, found.change, found.uncertainty, strict=True):
-        lines.append(f"{name:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values))
-    return "\n".join(
-        [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
-    )
 
 
 def verdict_lines(assessment: VerificationAssessment, rule: Message) -> list[str]:

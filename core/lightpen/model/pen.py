@@ -17,7 +17,6 @@ References
    Review 13 (2013) 194-199, section 2 (a).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -25,7 +24,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.messages import Message, message
 from lightpen.model.self_calibration import EXACT_SCALE, FoundPen, are_shared
 
 DISC_DIAMETER = 10.0  # mm, of each LED of the paper's pen
@@ -40,11 +38,6 @@ MIN_SEPARATION = 0.6  # of a disc's diameter, between two LEDs
 MIN_OFF_LINE = 0.02  # of the pen's extent, of the LED farthest from the best line
 
 _BACK, _LEFT, _RIGHT = slice(0, 4), slice(4, 7), slice(7, 10)
-_HANDEDNESS = (
-    message("pen.sign-of-x"),
-    message("pen.sign-of-y"),
-    message("pen.sign-of-z"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +130,14 @@ def check_frame(pen: Pen) -> None:
 
     The layout is recognised from the geometry, whatever the order and the frame of the
     LEDs. Pens of other layouts pass. Raises `FileError`, which names the LED and the
-    amount, if LEDs are exchanged, an axis is mirrored, or the coordinates are in
+    amount, if LEDs are exchanged or mirrored, or the coordinates are in
     another frame, such as a measuring machine's.
     """
     slots = _layout(pen.leds)
     if slots is None:
         return
     if not _check_order(pen.leds, slots):
-        raise _mirrored(pen.leds)
+        raise FileError("pen.mirror-image")
     deviations = np.linalg.norm(_in_frame(pen.leds) - pen.leds, axis=1)
     worst = int(np.argmax(deviations))
     if deviations[worst] > FRAME_TOLERANCE:
@@ -172,9 +165,7 @@ def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
         raise ValueError(f"`raw_leds` must have shape (10, 3), got {raw_leds.shape}.")
     slots = _layout(raw_leds)
     if slots is None:
-        raise FileError(
-            "pen.no-frame", tolerance=FRAME_TOLERANCE, misfit=_misfit(raw_leds)
-        )
+        raise FileError("pen.no-frame", tolerance=FRAME_TOLERANCE)
     if not _check_order(raw_leds, slots):
         raise FileError("pen.mirror-image")
     return _frame(raw_leds)
@@ -333,55 +324,7 @@ def _out_of_order(order: IntArray) -> FileError:
         return FileError(
             "pen.leds-exchanged", first=int(wrong[0]) + 1, second=int(wrong[1]) + 1
         )
-    places = _listing(
-        [
-            message("pen.led-in-place-of", led=int(order[j]) + 1, other=int(j) + 1)
-            for j in wrong
-        ]
-    )
-    return FileError("pen.out-of-order", places=places)
-
-
-def _mirrored(leds: FloatArray) -> FileError:
-    """Return the error about LEDs that are in order but left-handed."""
-    for axis in range(3):
-        mirrored = leds.copy()
-        mirrored[:, axis] *= -1
-        if np.abs(_in_frame(mirrored) - mirrored).max() <= FRAME_TOLERANCE:
-            break
-    else:
-        return FileError("pen.neither-framed-nor-handed")
-    worst = int(np.argmax(np.abs(leds[:, axis])))
-    return FileError(
-        "pen.mirrored-axis",
-        axis="xyz"[axis],
-        led=worst + 1,
-        found=float(leds[worst, axis]),
-        needed=-float(leds[worst, axis]),
-        rule=_HANDEDNESS[axis],
-    )
-
-
-def _misfit(leds: FloatArray) -> Message:
-    """Return why LEDs are not of the paper's layout."""
-    if len(leds) != 10:
-        return message("pen.led-count", n_leds=len(leds))
-    off_back = off_line(leds[_BACK])
-    front = leds[4:] - leds[4:].mean(axis=0)
-    off_plane = np.abs(front @ np.linalg.svd(front)[2][2])
-    if off_back.max() > FRAME_TOLERANCE:
-        return message(
-            "pen.off-line",
-            led=int(np.argmax(off_back)) + 1,
-            distance=float(off_back.max()),
-        )
-    if off_plane.max() > FRAME_TOLERANCE:
-        return message(
-            "pen.off-plane",
-            led=int(np.argmax(off_plane)) + 5,
-            distance=float(off_plane.max()),
-        )
-    return message("pen.not-parallel")
+    return FileError("pen.out-of-order", leds=", ".join(map(str, wrong + 1)))
 
 
 def _in_frame(leds: FloatArray) -> FloatArray:
@@ -400,11 +343,6 @@ def _frame(leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     y = y / np.linalg.norm(y)
     R = np.stack([np.cross(y, z), y, z])
     return R, -R @ origin
-
-
-def _listing(items: Sequence[Message]) -> Message:
-    *others, last = items
-    return message("list.and", others=tuple(others), last=last)
 
 
 # The effective tip: the point of the pen that stays most nearly at one place.

@@ -2910,7 +2910,7 @@
     </message>
     <message>
         <source>{0} of {1}</source>
-        <translation>{0}（{1}）</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>LED file</source>
@@ -5261,15 +5261,15 @@ needed</source>
     </message>
     <message>
         <source>Bending (part of U when measuring): {assumed:.3f} mm assumed; a press test measures it.</source>
-        <translation>弯曲（测量时计入 U）：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
-        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
-        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
@@ -5396,28 +5396,12 @@ needed</source>
         <translation>LED {led} 不在 LED 文件所示的位置</translation>
     </message>
     <message>
-        <source>LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.</source>
-        <translation>LED {led} 偏离 LED 1 至 4 的直线 {distance:.2f} mm。</translation>
-    </message>
-    <message>
-        <source>LED {led} is {distance:.2f} mm off the plane of LEDs 5 to 10.</source>
-        <translation>LED {led} 偏离 LED 5 至 10 的平面 {distance:.2f} mm。</translation>
-    </message>
-    <message>
         <source>LED {led} of {name}</source>
         <translation>{name} 的 LED {led}</translation>
     </message>
     <message>
         <source>LED {led} of {name} has no normal, but others have. Give the normals of all LEDs or of none.</source>
         <translation>{name} 的 LED {led} 没有法向量，而其他 LED 有。请给出全部法向量，或都不给。</translation>
-    </message>
-    <message>
-        <source>LEDs 1 to 4 must have negative z. Change the sign of all z.</source>
-        <translation>LED 1 至 4 的 z 必须为负。请改变所有 z 的符号。</translation>
-    </message>
-    <message>
-        <source>LEDs 5 to 7 must have negative x and 8 to 10 positive x. Change the sign of all x, or exchange the columns if they are numbered the wrong way.</source>
-        <translation>LED 5 至 7 的 x 必须为负，8 至 10 的 x 必须为正。请改变所有 x 的符号；若两列编号颠倒，请交换。</translation>
     </message>
     <message>
         <source>LEDs do not fit</source>
@@ -5776,10 +5760,6 @@ needed</source>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
     <message>
-        <source>The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
-        <translation>LED 编号顺序错误：{places}。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请照此编号。</translation>
-    </message>
-    <message>
         <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres or inches, state the unit, for example in the header: x_m, y_m, z_m.</source>
         <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米或英寸，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
     </message>
@@ -5817,11 +5797,7 @@ needed</source>
     </message>
     <message>
         <source>The drift reference seems to have moved by {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm), which noise alone explains.</source>
-        <translation>漂移参考点似乎移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm），仅噪声即可解释。</translation>
-    </message>
-    <message>
-        <source>The file has {n_leds} LEDs.</source>
-        <translation>文件有 {n_leds} 个 LED。</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>The file would be larger than allowed here. Write to another disk.</source>
@@ -5894,10 +5870,6 @@ needed</source>
     <message>
         <source>The joint fit did not converge. {cause}</source>
         <translation>联合拟合未收敛。{cause}</translation>
-    </message>
-    <message>
-        <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
-        <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
     <message>
         <source>The limits in {file} were not approved by a supervisor of this station. Nothing is accepted until the file is removed.</source>
@@ -6269,7 +6241,7 @@ needed</source>
     </message>
     <message>
         <source>top front hole bore dome countersink pad</source>
-        <translation>上面 前面 孔 内孔 球面 锥孔 凸台</translation>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>x and y of the LED centres are exchanged</source>
@@ -6306,10 +6278,6 @@ needed</source>
     <message>
         <source>{n_duplicates} views repeat the board position of another view and do not count ({names}). {n_views} views remain. Move the board between views.</source>
         <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入（{names}）。剩余 {n_views} 个视图。请在视图之间移动标定板。</translation>
-    </message>
-    <message>
-        <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
-        <translation>找到 {n_found} 个 LED；草图中有 {n_sketched} 个。请给出包含光笔全部 LED 的草图，或不给草图。</translation>
     </message>
     <message>
         <source>{n_leds} LEDs in {n_frames} frames of {name} are not seen: their centres are empty, NaN, (0, 0) or (-1, -1).</source>
@@ -6876,10 +6844,6 @@ needed</source>
         <translation>尺寸不符</translation>
     </message>
     <message>
-        <source>y must grow from LED 1 to LED 4. Change the sign of all y.</source>
-        <translation>y 必须从 LED 1 到 LED 4 递增。请改变所有 y 的符号。</translation>
-    </message>
-    <message>
         <source>{cell} is not a finite number.</source>
         <translation>{cell} 不是有限数。</translation>
     </message>
@@ -6950,10 +6914,6 @@ needed</source>
     <message>
         <source>{key} of {place} is no rotation: its rows must have the length 1 and be at right angles to each other. Give the matrix row by row, or a unit quaternion w x y z.</source>
         <translation>{place}的 {key} 不是旋转：各行的长度必须为 1 且两两垂直。请逐行给出矩阵，或给出单位四元数 w x y z。</translation>
-    </message>
-    <message>
-        <source>{led} where {other} belongs</source>
-        <translation>{other} 的位置上是 {led}</translation>
     </message>
     <message>
         <source>{n_images} {reason}</source>
@@ -7568,16 +7528,8 @@ needed</source>
         <translation>LED 坐标的误差约为 {sigma:.3f} mm（标准差），仅此即使 U (k = 2) = {uncertainty:.4f} mm。请检查 LED 文件是否属于此光笔。增加图像作用不大。</translation>
     </message>
     <message>
-        <source>The LED layout does not define the pen frame, which needs ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. {misfit} Measure the LEDs again, or give the coordinates of another layout in its own frame.</source>
-        <translation>LED 布局无法定义光笔坐标系：需要十个 LED，1 至 4 在一条直线上且位于 5 至 10 所在平面之后，5 至 10 排成与该直线平行的两列、每列三个，偏差均在 {tolerance:g} mm 以内。{misfit} 请重新测量 LED，或以其自身坐标系给出其他布局的坐标。</translation>
-    </message>
-    <message>
         <source>The LED layout of this pen is symmetric, so the LEDs cannot be identified. Move an LED, or give the LED centres.</source>
         <translation>这支光笔的 LED 布局对称，无法识别各 LED。请移动一个 LED，或直接给出 LED 中心。</translation>
-    </message>
-    <message>
-        <source>The LEDs are a mirror image of the pen, in another frame. Change the sign of one coordinate, then transform them to the pen frame.</source>
-        <translation>LED 是光笔的镜像，且不在光笔坐标系中。请改变一个坐标的符号，再转换到光笔坐标系。</translation>
     </message>
     <message>
         <source>The LEDs are a mirror image of the pen: seen from the front with LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on the right. If the machine&apos;s axes are left-handed, change the sign of one coordinate; if the columns are swapped, renumber them.</source>
@@ -7586,10 +7538,6 @@ needed</source>
     <message>
         <source>The LEDs are collinear within {off_line:.2f} mm over {extent:.0f} mm; a rotation about this line is not observable. At least one LED must be {needed:.1f} mm from the line.</source>
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
-    </message>
-    <message>
-        <source>The LEDs are mirrored in {axis} (left-handed frame): LED {led} has {axis} = {found:.2f} mm instead of {needed:.2f} mm. {rule}</source>
-        <translation>LED 沿 {axis} 镜像，是左手坐标系：LED {led} 的 {axis} = {found:.2f} mm，应为 {needed:.2f} mm。{rule}</translation>
     </message>
     <message>
         <source>The LEDs are not in the pen frame: LED {led} is {distance:.2f} mm from its nominal position (origin in front of LED 1, y along LEDs 1-4, LEDs 5-10 at z = 0). Transform measuring machine coordinates to the pen frame.</source>
@@ -7854,10 +7802,6 @@ needed</source>
     <message>
         <source>The folder {folder} is not empty: it contains {example}. Choose another folder, or empty it; nothing is overwritten.</source>
         <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
-    </message>
-    <message>
-        <source>The frame is not defined: the line of LEDs 1-4 is not parallel to the plane and the columns of LEDs 5-10, or is too close to them.</source>
-        <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
@@ -8166,6 +8110,14 @@ needed</source>
     <message>
         <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. {cause} Then check that the tip was pressed into the cone.</source>
         <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头似乎也在移动。{cause}然后检查测头是否压在锥孔中。</translation>
+    </message>
+    <message>
+        <source>LEDs {leds} are out of order. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
+        <translation>LED {leds} 的顺序有误。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 须沿两列同向排列。请按此编号。</translation>
+    </message>
+    <message>
+        <source>The LED layout does not define the pen frame, which needs ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. Measure the LEDs again, or give the coordinates of another layout in its own frame.</source>
+        <translation>LED 布局不能确定光笔坐标系：需要十个 LED，其中 1 至 4 在 5 至 10 所在平面之后成一直线，5 至 10 排成与该直线平行的两列、每列三个，均在 {tolerance:g} mm 以内。请重新测量 LED，或以自身坐标系给出其他布局的坐标。</translation>
     </message>
     <message>
         <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
@@ -8788,10 +8740,6 @@ needed</source>
         <translation>{name}：{flaw}</translation>
     </message>
     <message>
-        <source>{others} and {last}</source>
-        <translation>{others}和{last}</translation>
-    </message>
-    <message>
         <source>{path} does not contain all input data of the calibration. Calibrate from the images.</source>
         <translation>{path} 未包含计算测头所用的全部数据。请用图像标定。</translation>
     </message>
@@ -8822,10 +8770,6 @@ needed</source>
     <message>
         <source>The LEDs cannot be tracked: no {needed} successive images of {n_images} show the same 5 LEDs. Give the images in the order of capture, 10 or more a second, with the whole pen in view.</source>
         <translation>无法跟踪 LED：{n_images} 幅图像中没有连续 {needed} 幅显示相同的 5 个 LED。请按采集顺序给出图像，每秒 10 幅以上，且整支光笔在视场内。</translation>
-    </message>
-    <message>
-        <source>The LEDs found do not match the sketch in any order. Check that the sketch is of this pen, right-handed, in millimetres and accurate to 5 mm.</source>
-        <translation>找到的 LED 以任何顺序都与草图不符。请检查草图是否属于此光笔、为右手系、单位为毫米且精度为 5 mm。</translation>
     </message>
     <message>
         <source>The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. Check that the coordinates are in millimetres, also in the header, or state their unit.</source>

@@ -376,7 +376,7 @@ def test_an_uncertainty_that_is_no_number_is_refused(
     ("leds", "sentence"),
     [
         (LEDS / 1000, "leds.csv: The LEDs span only 0.18 mm"),
-        (LEDS * [1, 1, -1], "leds.csv: The LEDs are mirrored in z"),
+        (LEDS * [1, 1, -1], "leds.csv: The LEDs are a mirror image of the pen"),
         (LEDS[[0, 2, 1, *range(3, 10)]], "leds.csv: LEDs 2 and 3 are swapped"),
         (LEDS + np.array([0, 0, 500]), "The LEDs are not in the pen frame"),
     ],
@@ -413,7 +413,7 @@ def test_normals_and_tip_in_raw_coordinates_are_turned_too(tmp_path: Path) -> No
 
 
 def test_raw_coordinates_of_another_layout_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"leds\.csv: .* The file has 4 LEDs"):
+    with pytest.raises(FileError, match=r"leds\.csv: .* does not define the pen frame"):
         read_raw_pen(saved(tmp_path, table(FLAT)))
 
 

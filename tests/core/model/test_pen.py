@@ -73,7 +73,7 @@ def test_two_exchanged_leds_are_named(order: tuple[int, ...], pair: str) -> None
 
 @given(st.permutations(range(1, 11)).filter(lambda order: order != sorted(order)))
 def test_any_other_order_of_the_leds_is_refused(order: list[int]) -> None:
-    with pytest.raises(FileError, match=r"swapped|out of order|mirrored in x"):
+    with pytest.raises(FileError, match=r"swapped|out of order|mirror image"):
         check_frame(renumbered(*order))
 
 
@@ -86,27 +86,20 @@ def test_any_other_order_of_raw_leds_is_refused(order: list[int]) -> None:
 
 def test_leds_in_a_ring_of_wrong_places_are_listed() -> None:
     text = refusal(renumbered(2, 3, 1, 4, 5, 6, 7, 8, 9, 10))
-    assert "LED 3 where 1 belongs, 1 where 2 belongs and 2 where 3 belongs" in text
+    assert "LEDs 1, 2, 3 are out of order" in text
 
 
-@pytest.mark.parametrize(
-    ("axis", "sentence"),
-    [
-        (0, r"mirrored in x .* LED 7 has x = 25\.40 mm instead of -25\.40 mm"),
-        (1, r"mirrored in y .* LED 4 has y = -180\.00 mm .* y must grow"),
-        (2, r"mirrored in z .* LED 3 has z = 30\.20 mm .* must have negative z"),
-    ],
-)
-def test_the_mirrored_axis_is_named(axis: int, sentence: str) -> None:
+@pytest.mark.parametrize("axis", range(3))
+def test_a_mirrored_pen_is_refused(axis: int) -> None:
     leds = LEDS.copy()
     leds[:, axis] *= -1
-    with pytest.raises(FileError, match=sentence):
+    with pytest.raises(FileError, match="mirror image of the pen"):
         check_frame(replace(PEN, leds=leds))
 
 
 def test_exchanged_columns_are_refused() -> None:
     text = refusal(renumbered(1, 2, 3, 4, 8, 9, 10, 5, 6, 7))
-    assert "or exchange the columns" in text
+    assert "if the columns are swapped, renumber them" in text
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -120,11 +113,6 @@ def test_the_led_farthest_from_its_place_is_named() -> None:
     turned = LEDS @ rotation_from_vector(np.array([0.0, 0.0, 0.02])).T
     text = refusal(replace(PEN, leds=turned))
     assert "LED 4 is 3.60 mm from its nominal position" in text  # 180 mm times 0.02
-
-
-def test_a_mirrored_pen_in_raw_coordinates_is_distinguished() -> None:
-    text = refusal(replace(PEN, leds=moved(LEDS, 1) * [1, 1, -1]))
-    assert "mirror image of the pen, in another frame" in text
 
 
 def test_normals_away_from_the_viewer_are_refused() -> None:
@@ -207,24 +195,17 @@ def test_mirrored_raw_coordinates_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("led", "shift", "sentence"),
-    [
-        (3, [4.0, 0.0, 0.0], r"LED 3 is \d\.\d\d mm off the line of LEDs 1 to 4"),
-        (6, [0.0, 0.0, 4.0], r"LED \d+ is \d\.\d\d mm off the plane of LEDs 5 to 10"),
-        (6, [9.0, 0.0, 0.0], "not parallel to the plane"),
-    ],
+    ("led", "shift"), [(3, [4.0, 0.0, 0.0]), (6, [0.0, 0.0, 4.0]), (6, [9.0, 0.0, 0.0])]
 )
-def test_what_keeps_raw_leds_from_the_frame_is_named(
-    led: int, shift: list[float], sentence: str
-) -> None:
+def test_raw_leds_off_the_layout_are_refused(led: int, shift: list[float]) -> None:
     leds = LEDS.copy()
     leds[led - 1] += shift
-    with pytest.raises(FileError, match=sentence):
+    with pytest.raises(FileError, match="does not define the pen frame"):
         pen_frame_from_raw(moved(leds, 1))
 
 
 def test_raw_leds_of_another_number_are_refused() -> None:
-    with pytest.raises(FileError, match="The file has 9 LEDs"):
+    with pytest.raises(FileError, match="does not define the pen frame"):
         pen_frame_from_raw(LEDS[:9])
 
 

@@ -7,15 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import (
-    above_zero,
-    add_ball,
-    add_json,
-    add_limits,
-    add_verdict,
-    finite,
-    not_negative,
-)
+from lightpen.commands.arguments import above_zero, add_json, finite, not_negative
 from lightpen.commands.console import (
     DONE,
     printing,
@@ -24,8 +16,6 @@ from lightpen.commands.console import (
     verdict_status,
     write_record,
 )
-from lightpen.commands.entering import add_entering, keep_record
-from lightpen.commands.pen_health import add_verify_pen, add_verify_press
 from lightpen.comparisons.assessment import VERIFY_AGAIN, VerificationAssessment, check
 from lightpen.comparisons.records import COLUMN, verdict_lines
 from lightpen.errors import FileError, UsageError
@@ -36,6 +26,17 @@ from lightpen.model.artefacts import REFERENCE, Artefact, ArtefactKind, Side
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
+from lightpen_extensions.comparisons.commands.entering import (
+    add_ball,
+    add_entering,
+    add_limits,
+    add_verdict,
+    keep_record,
+)
+from lightpen_extensions.comparisons.commands.pens import (
+    add_verify_pen,
+    add_verify_press,
+)
 from lightpen_extensions.measure.commands.touched import (
     MeasuredRuns,
     add_runs,

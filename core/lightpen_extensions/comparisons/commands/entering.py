@@ -1,4 +1,4 @@
-"""Stores and enters a verification by command in the data folder of its tip."""
+"""Options of verdicts and entries; stores and enters a verification by command."""
 
 import argparse
 from collections.abc import Mapping
@@ -7,12 +7,17 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from lightpen.commands.arguments import chosen_limits
+from lightpen.commands.arguments import above_zero, not_negative, number_from
 from lightpen.commands.console import shown, write_record
 from lightpen.errors import UsageError
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DecisionRule
-from lightpen.model.limits import StationLimits, VerificationLimits
+from lightpen.model.limits import (
+    BALL_UNCERTAINTY,
+    LIMITS,
+    StationLimits,
+    VerificationLimits,
+)
 from lightpen.model.names import Origin
 from lightpen.record.calibrations import CalibrationFile
 from lightpen.record.folder import attributed, keep_verification
@@ -20,6 +25,78 @@ from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.result_folder import FolderArchive, data_folder_of
 from lightpen.record.swings.header import Names
+
+RULE_WORDS = {
+    "simple": DecisionRule.SIMPLE,
+    "guard-band": DecisionRule.GUARD_BAND,
+    "risk": DecisionRule.RISK,
+}
+
+
+def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add options for fields of `VerificationLimits`; `chosen_limits` reads them."""
+    parser.set_defaults(limits=names)
+    for limit in LIMITS:
+        if limit.part == "verification" and limit.name in names:
+            parser.add_argument(
+                f"--limit-{limit.name.replace('_', '-')}",
+                type=above_zero if limit.range[0] else not_negative,
+                metavar=limit.unit.upper(),
+                help=f"{limit.label} ({limit.default:g})",
+            )
+
+
+def chosen_limits(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the limits and the decision rule that are given, by their names."""
+    given = {
+        name: getattr(options, f"limit_{name}", None)
+        for name in getattr(options, "limits", ())
+    }
+    rule = getattr(options, "decision_rule", None)
+    given["rule"] = None if rule is None else RULE_WORDS[rule]
+    given["risk"] = getattr(options, "max_risk", None)
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def add_verdict(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the verdict and its output; see `chosen_limits`."""
+    parser.add_argument(
+        "--decision-rule",
+        choices=tuple(RULE_WORDS),
+        help="how a value with U is compared with its limit: simple acceptance, guard "
+        "band (ISO 14253-1), or risk (JCGM 106)",
+    )
+    parser.add_argument(
+        "--max-risk",
+        type=number_from(0.1, 50.0, "risk", "%"),
+        metavar="PERCENT",
+        help="risk of a wrong decision by --decision-rule risk (5)",
+    )
+    add_exit_by_verdict(parser)
+
+
+def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
+    """Add the exit status by the verdict; `verdict_status` returns it."""
+    parser.add_argument(
+        "--exit-by-verdict",
+        action="store_true",
+        help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
+        "if it is CHECK (not proven), 5 if it passes but does not verify the tip",
+    )
+
+
+def add_ball(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Add the options of the ball."""
+    parser.add_argument(
+        "--ball-diameter", type=not_negative, metavar="MM", help=meaning
+    )
+    parser.add_argument(
+        "--ball-uncertainty",
+        type=not_negative,
+        default=BALL_UNCERTAINTY,
+        metavar="MM",
+        help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
+    )
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:

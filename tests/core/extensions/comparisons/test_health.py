@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.pen_health import PenHealth, _without_move, examine_pen
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.comparisons.pen_health import (
+    PenHealth,
+    _without_move,
+    examine_pen,
+)
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA, PEN = paper_camera(), paper_pen()

@@ -1,4 +1,4 @@
-"""Tests of `lightpen.comparisons.pen_health`."""
+"""Tests of `lightpen_extensions.comparisons.pen_health`."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +10,6 @@ import pytest
 from msgspec import structs
 from tests.simulated_sessions import recorded
 
-from lightpen.comparisons.pen_health import examine_pen
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
@@ -20,6 +19,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.formats.own_json import FileRecord
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile
+from lightpen_extensions.comparisons.pen_health import examine_pen
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,

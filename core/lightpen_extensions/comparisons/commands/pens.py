@@ -2,10 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from lightpen.commands.arguments import (
     add_camera_and_pen,
-    add_exit_by_verdict,
     add_file,
     add_json,
     supervisor_signature,
@@ -16,13 +18,12 @@ from lightpen.commands.console import (
     shown,
     verdict_status,
 )
-from lightpen.commands.entering import add_entering, keep_record
-from lightpen.comparisons.pen_health import GROWN, MOVED, examine_pen, require_one_pen
 from lightpen.comparisons.press_test import PRESS_TEST, PressTest, press_test
 from lightpen.comparisons.records import (
-    pen_health_entries,
-    pen_health_text,
-    press_test_text,
+    BY_SIMPLE_ACCEPTANCE,
+    COLUMN,
+    TITLE,
+    verdict_lines,
     verification_record,
 )
 from lightpen.errors import UsageError
@@ -38,6 +39,19 @@ from lightpen.record.calibrations import CalibrationFile, keep_bending, read_cal
 from lightpen.record.library.library_changes import Author
 from lightpen.record.recomputing import recompute, recorded_camera_and_pen
 from lightpen.record.results.result_folder import data_folder_of
+from lightpen_extensions.comparisons.commands.entering import (
+    add_entering,
+    add_exit_by_verdict,
+    keep_record,
+)
+from lightpen_extensions.comparisons.pen_health import (
+    GROWN,
+    MOVED,
+    Growth,
+    PenHealth,
+    examine_pen,
+    require_one_pen,
+)
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
@@ -163,3 +177,59 @@ def _keep_bending(
     by = Author(names.station, names.operator, "press test", signature)
     keep_bending(data, names.tip, bending, by, now)
     print(shown(f"Stored with tip {names.tip}, due {bending.due}."))
+
+
+def pen_health_entries(found: PenHealth) -> dict[str, Any]:
+    """Return the entries of a pen's history."""
+    return {
+        "moved_leds": found.moved,
+        **_growth_entries(found.growth),
+        "swings": [
+            {
+                "name": swing.name,
+                "shifts_mm": swing.shifts,
+                **_growth_entries(swing.growth),
+            }
+            for swing in found.swings
+        ],
+    }
+
+
+def _growth_entries(found: Growth | None) -> dict[str, float | None]:
+    relative, uncertainty = found or (None, None)
+    return {"growth": relative, "growth_expanded_uncertainty": uncertainty}
+
+
+def pen_health_text(found: PenHealth) -> str:
+    """Return a pen over its swings as text."""
+    n_leds = len(found.swings[0].shifts)
+    lines = [
+        "LEDs since the first swing, mm, and size of the pen, ppm",
+        f"{'Swing':<{TITLE}}"
+        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
+        + f"{'size':>{COLUMN}}{'U':>{COLUMN}}",
+    ]
+    for swing in found.swings:
+        lengths = np.linalg.norm(swing.shifts, axis=1)
+        cells = "".join(
+            f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
+            for x in lengths
+        )
+        size = "".join(
+            f"{'-' if ppm is None else format(1e6 * ppm, '+.0f'):>{COLUMN}}"
+            for ppm in swing.growth or (None, None)
+        )
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
+    by_rule = verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)
+    return "\n".join([*lines, "", *by_rule])
+
+
+def press_test_text(found: PressTest) -> str:
+    """Return the change by firm pressure as text."""
+    names = ("Tip x", "Tip y (along pen)", "Tip z")
+    lines = [f"{'Firm less light, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
+    for name, *values in zip(names, found.change, found.uncertainty, strict=True):
+        lines.append(f"{name:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values))
+    return "\n".join(
+        [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
+    )

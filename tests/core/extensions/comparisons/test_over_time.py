@@ -1,4 +1,4 @@
-"""Tests of `lightpen.comparisons.pen_health` on a data folder."""
+"""Tests of `lightpen_extensions.comparisons.pen_health` on a data folder."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from tests.accepted_tip import accept_tip
 
-from lightpen.comparisons.pen_health import read_pen_over_time
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import mark_simulated
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.comparisons.pen_health import read_pen_over_time
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 LED_ERROR = 0.01  # mm

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import above_zero, add_json, add_verdict
+from lightpen.commands.arguments import above_zero, add_json
 from lightpen.commands.console import (
     printing,
     require_other_file,
     shown,
     verdict_status,
 )
-from lightpen.commands.entering import add_entering, keep_record, limits_in_force
-from lightpen.comparisons.pen_health import require_one_pen
 from lightpen.comparisons.records import (
     repeatability_entries,
     repeatability_text,
@@ -27,6 +25,13 @@ from lightpen.formats.own_json import file_entry
 from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen_extensions.comparisons.commands.entering import (
+    add_entering,
+    add_verdict,
+    keep_record,
+    limits_in_force,
+)
+from lightpen_extensions.comparisons.pen_health import require_one_pen
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,1 @@
+"""Calibrations compared: repeatability, recalculation, health of a pen, press test."""

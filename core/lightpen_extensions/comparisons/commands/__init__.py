@@ -1,0 +1,1 @@
+"""The commands that compare calibrations, and the options they share with others."""
