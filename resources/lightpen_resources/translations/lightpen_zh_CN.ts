@@ -2910,7 +2910,7 @@
     </message>
     <message>
         <source>{0} of {1}</source>
-        <translation type="unfinished"></translation>
+        <translation>{0}（{1}）</translation>
     </message>
     <message>
         <source>LED file</source>
@@ -5261,15 +5261,15 @@ needed</source>
     </message>
     <message>
         <source>Bending (part of U when measuring): {assumed:.3f} mm assumed; a press test measures it.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
     </message>
     <message>
         <source>Bending (part of U when measuring): {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
-        <translation type="unfinished"></translation>
+        <translation>弯曲（测量时计入 U）：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
     </message>
     <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
@@ -5797,7 +5797,7 @@ needed</source>
     </message>
     <message>
         <source>The drift reference seems to have moved by {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm), which noise alone explains.</source>
-        <translation type="unfinished"></translation>
+        <translation>漂移参考点似乎移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm），仅噪声即可解释。</translation>
     </message>
     <message>
         <source>The file would be larger than allowed here. Write to another disk.</source>
@@ -6241,7 +6241,7 @@ needed</source>
     </message>
     <message>
         <source>top front hole bore dome countersink pad</source>
-        <translation type="unfinished"></translation>
+        <translation>上面 前面 孔 内孔 球面 锥孔 凸台</translation>
     </message>
     <message>
         <source>x and y of the LED centres are exchanged</source>
