@@ -19,17 +19,6 @@ USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
 
 
 @dataclass(frozen=True, eq=False)
-class ProbedArea:
-    """A feature and how far it reaches."""
-
-    kind: FeatureKind
-    origin: FloatArray  # (3,), as `features.Feature` has them
-    axes: FloatArray  # (3, 3)
-    sizes: FloatArray  # (S,)
-    half: FloatArray  # (3,), half of its extent along its axes, mm
-
-
-@dataclass(frozen=True, eq=False)
 class Place:
     """A place on a feature, and the normal there, out of round surfaces; (3,) each."""
 
@@ -37,76 +26,54 @@ class Place:
     normal: FloatArray
 
 
-def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
-    """Return the area of a feature by its nominals; None if they do not suffice."""
-    if nominal.origin is None:
-        return None
-    z = np.array(nominal.axis or (0.0, 0.0, 1.0))
-    length = nominal.length or USUAL_LENGTH
-    width = nominal.width or length
-    radius = (nominal.diameter or 0.0) / 2
-    named = {"radius": radius, "half_angle": np.radians((nominal.angle or 90.0) / 2)}
+def places_on(kind: FeatureKind, nominal: Nominal, n: int) -> list[Place]:
+    """Return n places by nominals, each as far as can be from those before it.
+
+    Empty if the nominals do not suffice.
+    """
     names = SURFACES[kind].sizes
-    if names and not radius:
-        return None
-    is_flat = kind is FeatureKind.PLANE
-    half = [length, width, 0.0] if is_flat else [radius, radius, length]
-    return ProbedArea(
-        kind,
-        np.array(nominal.origin),
-        frame_about(z),
-        np.array([named[name] for name in names]),
-        INSIDE / 2 * np.array(half),
-    )
-
-
-def spread_places(area: ProbedArea, n: int) -> list[Place]:
-    """Return n places, each as far as can be from those before it."""
-    places = _places(area)
-    away = np.full(len(places), np.inf)
-    found = []
+    radius, half_angle = (nominal.diameter or 0) / 2, (nominal.angle or 90) / 2
+    if nominal.origin is None or (names and not radius):
+        return []
+    sizes = np.array([radius, np.radians(half_angle)])[: len(names)]
+    q = _places(kind, sizes, nominal)
+    gradients = SURFACES[kind].distances(q, sizes).by_point[:, 0]
+    axes = frame_about(np.array(nominal.axis or (0.0, 0.0, 1.0)))
+    away, found = np.full(len(q), np.inf), []
     for _ in range(n):
-        farthest = places[int(np.argmax(away))]
-        away = np.minimum(away, np.linalg.norm(places - farthest, axis=1))
-        found.append(_place(area, farthest))
+        i = int(np.argmax(away))
+        away = np.minimum(away, np.linalg.norm(q - q[i], axis=1))
+        found.append(Place(nominal.origin + axes @ q[i], axes @ gradients[i]))
     return found
 
 
-def _place(area: ProbedArea, q: FloatArray) -> Place:
-    gradient = SURFACES[area.kind].distances(q[None], area.sizes).by_point[0]
-    return Place(area.origin + area.axes @ q, area.axes @ gradient[0])
-
-
-def _places(area: ProbedArea) -> FloatArray:
+def _places(kind: FeatureKind, sizes: FloatArray, nominal: Nominal) -> FloatArray:
     """Return places (N, 3) spread over a feature, in its frame."""
-    along = np.linspace(-1, 1, N_ALONG) * area.half[2]
+    length = nominal.length or USUAL_LENGTH
+    width = nominal.width or length
+    along = INSIDE / 2 * length * np.linspace(-1, 1, N_ALONG)
     turn = 2 * np.pi * np.arange(N_ROUND) / N_ROUND
     round_ = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(N_ROUND)])
-    match area.kind:
+    z = np.array([0.0, 0.0, 1.0])
+    match kind:
         case FeatureKind.POINT:
             return np.zeros((1, 3))
         case FeatureKind.LINE:
-            return np.outer(along, [0.0, 0.0, 1.0])
+            return np.outer(along, z)
         case FeatureKind.PLANE:
-            side = np.linspace(-1, 1, N_GRID)
-            x, y = np.meshgrid(side * area.half[0], side * area.half[1])
+            side = INSIDE / 2 * np.linspace(-1, 1, N_GRID)
+            x, y = np.meshgrid(length * side, width * side)
             return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
         case FeatureKind.CIRCLE:
-            return np.asarray(area.sizes[0] * round_)
+            return np.asarray(sizes[0] * round_)
         case FeatureKind.SPHERE:
             tilt = np.linspace(0.0, HALF_ANGLE, N_ALONG)
-            caps = [
-                np.sin(t) * round_ + np.cos(t) * np.array([0.0, 0.0, 1.0]) for t in tilt
-            ]
-            return np.asarray(area.sizes[0] * np.concatenate(caps))
+            caps = [np.sin(t) * round_ + np.cos(t) * z for t in tilt]
+            return np.asarray(sizes[0] * np.concatenate(caps))
         case FeatureKind.CYLINDER | FeatureKind.CONE:
-            slope = 0.0 if area.kind is FeatureKind.CYLINDER else np.tan(area.sizes[1])
-            return np.concatenate(
-                [
-                    (area.sizes[0] + slope * z) * round_ + np.array([0.0, 0.0, z])
-                    for z in along
-                ]
-            )
+            slope = np.tan(sizes[1]) if kind is FeatureKind.CONE else 0.0
+            rings = [(sizes[0] + slope * h) * round_ + h * z for h in along]
+            return np.concatenate(rings)
 
 
 @dataclass(frozen=True, eq=False)

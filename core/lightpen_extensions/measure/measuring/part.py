@@ -123,7 +123,11 @@ def measure_part(
     plan = _with_kinds(plan, touches)
     probed = {each.name: _of_centres(each, touches) for each in plan.features}
     surfaces = _surfaces(plan, probed, touches, were_recognised)
-    with_form = _with_form(touches, probed.values(), surfaces)
+    artefacts = {
+        n for e in plan.characteristics if e.certified is not None for n in e.of
+    }
+    of_part = [each for name, each in probed.items() if name not in artefacts]
+    with_form = _with_form(touches, of_part, surfaces)
     alignment = _aligned(plan, surfaces)
     features = {}
     for name, surface in surfaces.items():

@@ -34,8 +34,7 @@ from lightpen_extensions.measure.measuring.features import Feature, fit_feature
 from lightpen_extensions.measure.measuring.next_touch import (
     PartTouches,
     Place,
-    nominal_area,
-    spread_places,
+    places_on,
 )
 from lightpen_extensions.measure.measuring.part import (
     CharacteristicResult,
@@ -155,10 +154,7 @@ def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
     """
     if planned.kind is None or planned.nominal is None:
         return ()
-    area = nominal_area(planned.kind, planned.nominal)
-    if area is None:
-        return ()
-    places = spread_places(area, planned.n_touches)
+    places = places_on(planned.kind, planned.nominal, planned.n_touches)
     if planned.side is Side.INSIDE:
         places = [replace(each, normal=-each.normal) for each in places]
     if planned.side is Side.CENTRE:
