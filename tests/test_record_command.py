@@ -164,24 +164,17 @@ def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("numbers", "note"),
-    [
-        ([21], "images/000021.png is in the folder but not in the journal; its"),
-        ([22, 21], "images/000021.png, images/000022.png are in the folder"),
-        ([24, 23, 22, 21], "4 images, the first images/000021.png, are in the folder"),
-    ],
-)
 def test_images_that_the_journal_does_not_name_are_reported(
-    lightpen: Run, folder: Path, numbers: list[int], note: str
+    lightpen: Run, folder: Path
 ) -> None:
-    for number in numbers:
+    for number in (24, 23, 22, 21):
         shutil.copy(folder / image_name(1), folder / image_name(number))
     outcome = lightpen("calibrate", folder)
 
     assert outcome.returncode == 0
     assert f"{N_IMAGES} of {N_IMAGES} used" in outcome.stdout
-    assert outcome.stderr.startswith(f"lightpen: {note}")
+    said = "lightpen: 4 images, the first images/000021.png, are in the folder"
+    assert outcome.stderr.startswith(said)
     assert outcome.stderr.count("lightpen:") == 1
 
 
@@ -189,17 +182,6 @@ def test_a_whole_record_has_nothing_to_report(lightpen: Run, folder: Path) -> No
     (folder / "images" / ".0123456789abcdef.part").write_bytes(b"torn")
 
     assert lightpen("calibrate", folder).stderr == ""
-
-
-@pytest.mark.parametrize("name", [HEADER, JOURNAL])
-def test_what_a_record_lacks_is_reported(
-    lightpen: Run, folder: Path, name: str
-) -> None:
-    (folder / name).unlink()
-    outcome = lightpen("calibrate", folder)
-
-    assert outcome.returncode == 2
-    assert f"swing 1 is incomplete: {name} is missing. Restore" in outcome.stderr
 
 
 def test_a_folder_that_is_no_record_still_needs_its_files(

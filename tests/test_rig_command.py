@@ -160,14 +160,6 @@ def test_centres_of_two_cameras_give_the_tip_as_well(
     np.testing.assert_allclose(tip, true_tip(station), atol=0.005)
 
 
-def test_folders_in_another_order_are_refused_by_their_names(
-    station: Path, lightpen: Run
-) -> None:
-    outcome = calibrate(lightpen, station, images=("right", "left"))
-
-    assert_refused(outcome, "another order than the cameras.*left, right", 2)
-
-
 def test_exchanged_folders_of_other_names_are_reported_by_their_images(
     copied: Path, lightpen: Run
 ) -> None:

@@ -36,7 +36,7 @@ from lightpen_app.face import Service
 from lightpen_app.faced import Face
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
-from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
+from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.start.page import StartPage
@@ -188,7 +188,6 @@ class Wizard(QObject):
         # Connections
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
-        self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.fault_changed.connect(self._on_folder_fault_changed)
         for model in (
             self.workbench.run,
@@ -233,18 +232,6 @@ class Wizard(QObject):
         """Advise another data folder while this one cannot be written."""
         folder = str(self.workbench.folder)
         self.window.set_unwritable(folder if fault else "", fault)
-
-    def _on_others_counted(self, n_others: int) -> None:
-        """Show that other windows use the same data folder, while they do."""
-        words = self.tr(
-            "The program is open in other windows using the same data folder, {0}. "
-            "Results are shared."
-        ).format(self.workbench.folder)
-        notices = self.workbench.notifications
-        if n_others:
-            notices.notify("other-windows", words, Tone.WARN)
-        else:
-            notices.withdraw("other-windows")
 
     def _open_log(self) -> None:
         folder = log_file(self.workbench.folder).parent

@@ -1,4 +1,4 @@
-"""The data folder is shown and can be chosen, and windows that share it say so."""
+"""The data folder is shown and can be chosen."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,28 +10,7 @@ from PySide6.QtWidgets import QFileDialog
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 
 if TYPE_CHECKING:
-    from tests.app.conftest import OpenWizard, Walker
-
-SHARED = "The program is open in other windows using the same data folder, "
-
-
-@pytest.mark.slow
-def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
-    open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lightpen_app.work.workbench.LOOKING_MS", 100)
-    first = open_wizard()
-    assert not first.tells(SHARED)
-    second = open_wizard()
-
-    second.until_tells(SHARED)
-    first.until_tells(SHARED)
-    assert first.tells(
-        "The program is open in other windows using the same data folder (1)."
-    )
-
-    second.window.close_unasked()
-    first.until(lambda: not first.tells(SHARED))
+    from tests.app.conftest import Walker
 
 
 @pytest.mark.slow

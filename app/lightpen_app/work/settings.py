@@ -307,10 +307,6 @@ class Settings(QObject):
         """Remember the laboratory that a certificate names."""
         self._save("last", {"laboratory": asdict(laboratory)})
 
-    def update_file(self) -> str:
-        """Return the file that names the newest version; empty for none."""
-        return self._machine.update_file
-
     def machine_limits(self) -> StationLimits:
         """Return the limits of this computer, which a station uses at first."""
         return self._machine.station_limits()

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Protocol
@@ -11,15 +10,13 @@ from typing import TYPE_CHECKING, Protocol
 from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
 from lightpen.archive.logbook import LazyLogbook
-from lightpen.formats.machine_settings import Update, read_update
 from lightpen.live.sources import SourceEnvironment
-from lightpen.messages import Message, message
-from lightpen.record.folder import Presence, check_writable, sweep_leftovers
+from lightpen.messages import Message
+from lightpen.record.folder import check_writable, sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen_app.look.languages import worded
-from lightpen_app.look.theme import Tone
 from lightpen_app.work.camera_setup import CameraSetup, FilesOfCameras
 from lightpen_app.work.chosen_files import ChosenFiles, SavePlace
 from lightpen_app.work.job import Job, Notifications, Report
@@ -76,44 +73,31 @@ LOOKING_MS = 5000  # from one look to the next
 
 
 class FolderWatch(QObject):
-    """Checks the data folder periodically and announces this window."""
+    """Checks now and then whether a data folder that failed can be written."""
 
-    # Number of other windows of the program that use it, when it changes.
-    counted = Signal(int)
     fault_changed = Signal(str)  # why the folder cannot be written; empty if it can
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._folder = folder
-        self._presence = Presence(folder)
-        self._n_others = 0
         self._fault = ""
-        self._counter: Job | None = None
         self._timer = QTimer(self, interval=LOOKING_MS)
 
         # Connections
         self._timer.timeout.connect(self._look)
 
     def start(self) -> None:
-        """Check now and periodically."""
+        """Check now, and again while it fails."""
         self._check()
-        self._count()
         self._timer.start()
 
     def stop(self) -> None:
         """Stop."""
         self._timer.stop()
 
-    def leave(self) -> None:
-        """Remove the announcement of this window, on a thread of the pool."""
-        QThreadPool.globalInstance().start(self._presence.leave)
-
     def _look(self) -> None:
-        if self._counter is not None:  # a disk that does not answer is asked once
-            return
         if self._fault:
             self._check()
-        self._count()
 
     def _check(self) -> None:
         folder = self._folder
@@ -128,20 +112,9 @@ class FolderWatch(QObject):
             self._fault = fault
             self.fault_changed.emit(fault)
 
-    def _count(self) -> None:
-        presence = self._presence
-        self._counter = job = Job(lambda _: presence.count_others(), self)
-        job.start(self._on_counted)
-
-    def _on_counted(self, n_others: int) -> None:
-        self._counter = None
-        if n_others != self._n_others:
-            self._n_others = n_others
-            self.counted.emit(n_others)
-
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
-SETTINGS, UPDATE = "settings", "update"  # causes of notifications
+SETTINGS = "settings"  # cause of notifications
 
 
 class WorkbenchPart(Protocol):
@@ -203,7 +176,6 @@ class Workbench(QObject):
             self._on_settings_failed(self.settings.fault)
         folder = self.folder  # no reference to self, which a job could outlive
         Job(lambda _: sweep_leftovers(folder), self).start()
-        self._look_for_update()
         self.run.runner.ask(lambda workflow: workflow.open_logbook())
         self._read_supervision()
         self.library.refresh()
@@ -237,7 +209,6 @@ class Workbench(QObject):
             part.await_end(max(0.0, deadline - monotonic()))
             for part in (self.run.runner, *self.parts)
         )
-        self.folder_watch.leave()
         pool.waitForDone(round(1000 * max(0.0, deadline - monotonic())))
         is_saved = self.settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
@@ -270,20 +241,6 @@ class Workbench(QObject):
 
     def _on_settings_failed(self, why: Message) -> None:
         self.notifications.notify(SETTINGS, worded(why))
-
-    def _look_for_update(self) -> None:
-        """Read the file that the administrator has named, if any."""
-        named = self.settings.update_file()
-        if named:
-            job = Job(lambda _: read_update(Path(named)), self)
-            job.start(self._on_update_read, partial(self.notifications.notify, UPDATE))
-
-    def _on_update_read(self, update: Update | None) -> None:
-        if update is not None:
-            newest = message(
-                "machine-settings.update", version=update.version, text=update.text
-            )
-            self.notifications.notify(UPDATE, worded(newest), Tone.GOOD)
 
     def _on_settings_recovered(self) -> None:
         self.notifications.withdraw(SETTINGS)

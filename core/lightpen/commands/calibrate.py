@@ -50,7 +50,6 @@ from lightpen.model.rigid import of_camera
 from lightpen.record.recomputing import recompute
 from lightpen.record.swings.reading import (
     is_record,
-    missing_parts,
     open_record,
     record_files,
     recorded_limits,
@@ -58,7 +57,6 @@ from lightpen.record.swings.reading import (
 )
 from lightpen.record.swings.solving import record_inputs, solve_again, solve_record
 
-MAX_NAMED = 3  # images; of more the first is named
 RIG_NEEDED = message("cli.rig-needed")
 
 
@@ -165,17 +163,9 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
 
 def _note_unacknowledged(names: Sequence[str]) -> None:
     """Report images that are excluded because no journal names them."""
-    if not names:
-        return
-    if len(names) == 1:
-        remark = message("record.image-unacknowledged", image=names[0])
-    elif len(names) <= MAX_NAMED:
-        remark = message("record.images-unacknowledged", images=", ".join(names))
-    else:
-        remark = message(
-            "record.many-images-unacknowledged", n_images=len(names), first=names[0]
-        )
-    note(remark)
+    if names:
+        n_images, first = len(names), names[0]
+        note(message("record.images-unacknowledged", n_images=n_images, first=first))
 
 
 def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") -> None:
@@ -184,23 +174,10 @@ def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") ->
         note(of_camera(name, doubt) if name else doubt)
 
 
-def _lacking(option: str, images: Sequence[str]) -> UsageError:
-    """Return the error that an option is missing, and why the images are no record."""
-    missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
-    if not missing:
-        return lacking(option)
-    return UsageError(
-        "cli.part-of-record-missing",
-        option=option,
-        folder=images[0],
-        missing=", ".join(missing),
-    )
-
-
 def _from_observations(options: argparse.Namespace) -> _Calibrated:
     for name, file in (("--camera", options.camera), ("--pen", options.pen)):
         if file is None:
-            raise _lacking(name, options.images)
+            raise lacking(name)
     camera = read_camera(options.camera)
     _note_doubts(camera, options)
     pen = _read_pen(options)
@@ -263,7 +240,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     if options.camera is not None:
         raise UsageError("cli.rig-and-camera")
     if options.pen is None:
-        raise _lacking("--pen", ())
+        raise lacking("--pen")
     rig_file = read_rig(options.rig)
     rig = rig_file.rig
     for name, camera in zip(rig.names, rig.cameras, strict=True):
@@ -280,7 +257,6 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         observations = observe_rig_centers(centers, pairing, rig, pen)
     else:
         _require_one_each(options.images, rig.n_cameras, in_order)
-        _require_other_names(options.images, rig.names)
         sources = [images_at(p).of_bits(options.bits) for p in options.images]
         files = tuple(file for source in sources for file in source.files)
         require_other_file(options.json, *files, *rig_file.camera_files)
@@ -325,18 +301,6 @@ def _require_one_each(
     places = [os.path.realpath(place) for place in given]
     if len(set(places)) < len(places):
         raise UsageError("cli.place-twice", why=why)
-
-
-def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
-    """Refuse folders that are named like the cameras, but in another order."""
-    folders = [Path(place).name.casefold() for place in places]
-    cameras = [name.casefold() for name in names]
-    if folders != cameras and sorted(folders) == sorted(cameras):
-        raise UsageError(
-            "cli.other-order",
-            folders=", ".join(map(str, places)),
-            names=", ".join(names),
-        )
 
 
 def _observe(

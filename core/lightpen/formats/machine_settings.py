@@ -3,14 +3,12 @@
 What a user chooses goes before it, and so do the limits of a supervisor.
 """
 
-import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import platformdirs
 
-from lightpen import __version__
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.own_json import DamagedError, in_shape, parse_own_json
@@ -27,40 +25,12 @@ class MachineSettings:
 
     language: str = ""
     archive_server: str = ""
-    update_file: str = ""  # names the newest version
     limits: Mapping[str, float] = field(default_factory=dict)  # of new stations, by key
     laboratory: Laboratory | None = None
 
     def station_limits(self) -> StationLimits:
         """Return the limits of a new station."""
         return StationLimits().with_values(self.limits)
-
-
-@dataclass(frozen=True)
-class Update:
-    """A newer version, with the text of an administrator."""
-
-    version: str
-    text: str = ""
-
-
-def read_update(file: Path) -> Update | None:
-    """Return the version that an administrator names, if it is newer than this one."""
-    data = read_bytes(file, message("file.update"), MEGABYTE)
-    try:
-        update = parse_own_json(data, Update)
-        is_newer = _numbers(update.version) > _numbers(__version__)
-    except ValueError as error:
-        raise FileError("machine-settings.no-version", file=file) from error
-    return update if is_newer else None
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    """Return the numbers of a release, of a candidate those of its release."""
-    release = re.match(r"\d+(?:\.\d+)*", version)
-    if release is None:
-        raise ValueError(version)
-    return tuple(map(int, release[0].split(".")))
 
 
 def machine_file() -> Path:

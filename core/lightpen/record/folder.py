@@ -1,4 +1,4 @@
-"""The data folder: verifications, camera calibrations, presence, clean-up."""
+"""The data folder: verifications, camera calibrations, clean-up."""
 
 import os
 import time
@@ -10,7 +10,6 @@ from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Final
-from uuid import uuid4
 
 from msgspec import Struct, field
 
@@ -28,7 +27,7 @@ from lightpen.formats.own_json import (
     record_heading,
     require_usual,
 )
-from lightpen.formats.part_files import locked, sweep_parts
+from lightpen.formats.part_files import sweep_parts
 from lightpen.messages import message
 from lightpen.model.names import Origin
 from lightpen.record.library.entered_files import add_numbered, entered_files
@@ -122,65 +121,6 @@ def check_writable(data: Path) -> None:
         raise FileError(
             "data-folder.unwritable", folder=data, reason=why_unwritten(error)
         ) from error
-
-
-WINDOWS = "windows"
-SUFFIX = ".lock"
-
-
-class Presence:
-    """Tells other windows that this one uses a data folder, and counts them."""
-
-    def __init__(self, data: Path) -> None:
-        self._folder = data / WINDOWS
-        self._file = self._folder / f"{uuid4().hex}{SUFFIX}"
-        self._descriptor: int | None = None
-
-    def count_others(self) -> int:
-        """Count the other windows that use the folder, and announce this one.
-
-        In a folder that cannot be written, windows do not count each other.
-        """
-        with suppress(OSError):
-            self._announce()
-            others = (f for f in self._folder.glob(f"*{SUFFIX}") if f != self._file)
-            return sum(map(_is_held, others))
-        return 0
-
-    def leave(self) -> None:
-        """Remove this window from the list of open windows."""
-        descriptor, self._descriptor = self._descriptor, None
-        if descriptor is not None:
-            os.close(descriptor)
-            with suppress(OSError):
-                self._file.unlink()
-
-    def _announce(self) -> None:
-        """Hold the file; another window that found it unlocked may have removed it."""
-        before = self._descriptor
-        if before is not None and not self._file.exists():
-            self._descriptor = None
-            os.close(before)
-        if self._descriptor is None:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            self._descriptor = os.open(self._file, os.O_RDWR | os.O_CREAT)
-        locked(self._descriptor)
-
-
-def _is_held(file: Path) -> bool:
-    """Return whether another window holds its file; remove it if none does."""
-    try:
-        descriptor = os.open(file, os.O_RDWR)
-    except FileNotFoundError:  # it has just left
-        return False
-    try:
-        is_free = locked(descriptor)
-    finally:
-        os.close(descriptor)
-    if is_free:
-        with suppress(OSError):
-            file.unlink()
-    return not is_free
 
 
 OLDEST = 1.0  # s; longest time between creating a folder and locking its journal

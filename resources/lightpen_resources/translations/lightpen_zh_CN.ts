@@ -443,10 +443,6 @@
         <translation>从下次启动起，将摆动记录和结果保存到其他文件夹。</translation>
     </message>
     <message>
-        <source>The program is open in other windows using the same data folder ({0}). Results are shared.</source>
-        <translation>另有 {0} 个程序窗口使用同一数据文件夹，结果共享。</translation>
-    </message>
-    <message>
         <source>Change...</source>
         <translation>更改...</translation>
     </message>
@@ -5140,10 +5136,6 @@ needed</source>
         <source>An internal error occurred. The program can continue; all images are saved. No report was written: the disk is full or write-protected.</source>
         <translation>发生内部错误。程序可继续运行；全部图像已保存。无法写入报告：磁盘已满或没有写入权限。</translation>
     </message>
-    <message>
-        <source>The program is open in other windows using the same data folder, {0}. Results are shared.</source>
-        <translation>其他程序窗口也在使用数据文件夹 {0}，结果共享。</translation>
-    </message>
 </context>
 <context>
     <name>core</name>
@@ -7776,10 +7768,6 @@ needed</source>
         <translation>文件 {file} 在档案中尚无记录。请启动程序进行登记。</translation>
     </message>
     <message>
-        <source>The file {file} names no version, such as {{&quot;version&quot;: &quot;1.1.0&quot;}}. Ask the administrator to correct it.</source>
-        <translation>文件 {file} 未给出版本，例如 {{&quot;version&quot;: &quot;1.1.0&quot;}}。请管理员更正。</translation>
-    </message>
-    <message>
         <source>The file {file} of entry {number} was modified after it was entered.</source>
         <translation>第 {number} 个条目的文件 {file} 与录入时不符。</translation>
     </message>
@@ -8304,10 +8292,6 @@ needed</source>
         <translation>验证完成。可以放下光笔。</translation>
     </message>
     <message>
-        <source>Version {version} of Lightpen is available. {text}</source>
-        <translation>Lightpen 版本 {version} 可用。{text}</translation>
-    </message>
-    <message>
         <source>Webcam (evaluation only)</source>
         <translation>网络摄像头（仅供试用）</translation>
     </message>
@@ -8406,10 +8390,6 @@ needed</source>
     <message>
         <source>file of settings for all users</source>
         <translation>所有用户的设置文件</translation>
-    </message>
-    <message>
-        <source>file that names the newest version</source>
-        <translation>给出最新版本的文件</translation>
     </message>
     <message>
         <source>flatness</source>

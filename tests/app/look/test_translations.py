@@ -58,7 +58,7 @@ NAMES = {
     *("Lightpen", "English", "Fusion", "Lightpen Sans", "Lightpen Sans SC", "Cgk"),
     *("Demo", "Trial", "Trainee"),  # of stations, pens and tips
     *("yyyy-MM-dd hh:mm", "fixed point", "export folder", "under way"),  # for programs
-    *("other windows", "without images"),  # causes of notifications
+    "without images",  # cause of notifications
 }
 
 

@@ -432,26 +432,6 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
     assert not stage.workbench.live.is_open
 
 
-@pytest.mark.parametrize(("version", "is_reported"), [("999.1", True), ("0.1", False)])
-def test_a_newer_version_that_an_administrator_names_is_reported_at_the_start(
-    stage: Stage,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    version: str,
-    is_reported: bool,
-) -> None:
-    file = tmp_path / "update.json"
-    file.write_text(json.dumps({"version": version, "text": "Ask IT for it."}))
-    monkeypatch.setattr(Settings, "update_file", lambda _: str(file))
-
-    stage.start_again()
-    assert QThreadPool.globalInstance().waitForDone(60_000)
-    QCoreApplication.processEvents()
-
-    found = [text for text in stage.sentences if "Ask IT for it." in text]
-    assert [version in text for text in found] == ([True] if is_reported else [])
-
-
 def test_what_is_reported_after_shutting_down_begins_nothing(stage: Stage) -> None:
     workbench = stage.workbench
     stream = StreamService(workbench)

@@ -5,14 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from lightpen import __version__
 from lightpen.errors import FileError
 from lightpen.formats.machine_settings import (
     MachineSettings,
-    Update,
     machine_file,
     machine_settings,
-    read_update,
 )
 from lightpen.model.names import Laboratory
 from lightpen_extensions.plant.server import SERVER, server_address
@@ -54,30 +51,6 @@ def test_laboratory_and_procedure_are_read(file: Path) -> None:
 
     known = Laboratory(name="Works 2", procedure="WI-0815")
     assert machine_settings().laboratory == known
-
-
-@pytest.mark.parametrize(
-    ("named", "is_newer"),
-    [("999.0", True), ("999.0.0rc1", True), (__version__, False), ("0.9.9", False)],
-)
-def test_an_update_is_a_version_that_is_newer(
-    tmp_path: Path, named: str, is_newer: bool
-) -> None:
-    file = tmp_path / "newest.json"
-    file.write_text(json.dumps({"version": named, "text": "Ask IT."}))
-
-    assert read_update(file) == (Update(named, "Ask IT.") if is_newer else None)
-
-
-@pytest.mark.parametrize("content", [{}, {"version": "new"}, {"version": 2}])
-def test_a_file_that_names_no_version_is_reported(
-    tmp_path: Path, content: dict[str, object]
-) -> None:
-    file = tmp_path / "newest.json"
-    file.write_text(json.dumps(content))
-
-    with pytest.raises(FileError, match="names no version"):
-        read_update(file)
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,6 @@ class StartPage(ResponsiveLayout, Page):
         self._unfinished.step_requested.connect(self.step_requested)
         self._last.verification_requested.connect(self._entries.settle)
         self._last.verification_requested.connect(lambda: show(verify))
-        workbench.folder_watch.counted.connect(setup.folder.set_others)
         workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
         workbench.library.changed.connect(self._refresh)
         workbench.selection.changed.connect(self._on_selected)

@@ -39,7 +39,7 @@ from lightpen_app.work.workbench import Workbench
 
 
 class DataFolderPanel(Translated, QGroupBox):
-    """Shows and opens the data folder, and other windows that use it."""
+    """Shows and opens the data folder."""
 
     change_requested = Signal()  # choose another folder
 
@@ -48,7 +48,6 @@ class DataFolderPanel(Translated, QGroupBox):
         self.say(self, self.tr("Data folder"))
         self._folder = folder
         self._notices = notifications
-        self._n_others = 0
         self._fault = ""
 
         # Widgets
@@ -68,24 +67,18 @@ class DataFolderPanel(Translated, QGroupBox):
                 "Save swings and results in another folder from the next start."
             ),
         )
-        self._others = SignLabel()
         self._doubt = SignLabel()
 
         # Layout
         layout = vertical_layout(self)
         fill(layout, self._path)
         horizontal_layout(layout, self._open, self._change, 1)
-        fill(layout, self._doubt, self._others)
+        fill(layout, self._doubt)
 
         # Connections
         self._open.clicked.connect(self._on_open_clicked)
         self._change.clicked.connect(self.change_requested)
 
-        self._retranslate()
-
-    def set_others(self, n_others: int) -> None:
-        """Show the number of other windows that use the folder."""
-        self._n_others = n_others
         self._retranslate()
 
     def set_fault(self, fault: str) -> None:
@@ -101,14 +94,6 @@ class DataFolderPanel(Translated, QGroupBox):
         self._change.style().polish(self._change)
         doubt = StatusMessage.fault(breakable(self._fault))
         self._doubt.set_value(doubt if self._fault else StatusMessage())
-        remark = StatusMessage()
-        if self._n_others:
-            text = self.tr(
-                "The program is open in other windows using the same data folder "
-                "({0}). Results are shared."
-            ).format(self._n_others)
-            remark = StatusMessage.warning(text)
-        self._others.set_value(remark)
 
 
 class SetupView(Translated, QWidget):

@@ -349,13 +349,6 @@ def is_record(folder: Path) -> bool:
         raise unreadable(folder, FOLDER, error) from error
 
 
-def missing_parts(folder: Path) -> tuple[str, ...]:
-    """Return the missing files of a folder that looks like a record."""
-    parts = (HEADER, JOURNAL, IMAGES)
-    missing = tuple(name for name in parts if not (folder / name).exists())
-    return missing if len(missing) < len(parts) else ()
-
-
 def unacknowledged_images(record: Record) -> tuple[str, ...]:
     """Return the image files, in order, that the journal of a record does not name.
 
