@@ -36,7 +36,7 @@ from lightpen_app.work.job import LatestJob, Report
 
 TABLE_WIDTH = 38 * GRID
 VIEW_SHARE, PLOT_SHARE = 3, 2  # of the height
-LEAST_HEIGHT = 16 * GRID  # px, of the image
+LEAST_HEIGHT = 9 * GRID  # px, of the image
 RING = 10.0  # image px about an LED
 
 

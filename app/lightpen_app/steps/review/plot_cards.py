@@ -38,7 +38,6 @@ class PlotCard(Translated, QFrame):
         self.plot = plot
         self._file_stem = file_stem
         self.setProperty("area", "panel")
-        plot.setMinimumHeight(LEAST_HEIGHT)
 
         self._is_needed = True
 
@@ -96,6 +95,7 @@ class PlotGrid(QWidget):
         layout = grid_layout(self)
         for i, card in enumerate(self._cards):
             layout.addWidget(card, *divmod(i, N_COLUMNS))
+            card.plot.setMinimumHeight(LEAST_HEIGHT)
 
         # Connections
         for card in self._cards:
