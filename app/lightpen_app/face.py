@@ -20,6 +20,7 @@ from lightpen_app.work.workbench import Workbench
 if TYPE_CHECKING:  # they take long to be imported
     from lightpen.archive.chains import Event
     from lightpen.record.exports import ExportFormat
+    from lightpen.record.swings.solving import Solution
 
 W = TypeVar("W", bound=QWidget)
 
@@ -114,6 +115,18 @@ class ReportPrinter(QObject):
         """Cancel what is not shown yet."""
 
 
+class BudgetRow(QWidget):
+    """Checks the budget of a solution, below its plot."""
+
+    def set_value(self, solution: "Solution") -> None:
+        """Show another solution and discard what was found of the earlier one."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """Compute no more."""
+        raise NotImplementedError
+
+
 class Service(QObject):
     """An extension at work in one window; by default it does nothing.
 
@@ -173,6 +186,10 @@ class Service(QObject):
     def export_formats(self) -> "tuple[ExportFormat, ...]":
         """Return formats in which a calibration can be saved."""
         return ()
+
+    def budget_row(self) -> BudgetRow | None:
+        """Make a check of the budget."""
+        return None
 
     def event_text(self, event: "Event") -> str:
         """Return the kind of its entry in the archive; empty for an entry of others."""

@@ -9,13 +9,13 @@ from lightpen.extension import Extension
 from lightpen.live.sources import Simulator
 from lightpen_app.faced import Face, Faced
 from lightpen_app_extensions.boards import BOARDS
+from lightpen_app_extensions.comparisons import COMPARISONS
 from lightpen_app_extensions.discover import DISCOVER
 from lightpen_app_extensions.exports import EXPORTS
 from lightpen_app_extensions.measure import MEASURE
 from lightpen_app_extensions.plant import PLANT
 from lightpen_app_extensions.report import REPORT
 from lightpen_app_extensions.stream import STREAM
-from lightpen_extensions.comparisons.extension import COMPARISONS
 from lightpen_extensions.drivers.extension import DRIVERS
 from lightpen_extensions.simulator.extension import SIMULATOR
 

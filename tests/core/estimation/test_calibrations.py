@@ -10,7 +10,6 @@ from benchmarks.small_records import entries_of
 from tests.simulated_calibrations import SWINGS, true_tip
 
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.monte_carlo import run_trial, trials_of
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import Grade, judge
@@ -18,6 +17,7 @@ from lightpen.estimation.uncertainty.prediction import predict_uncertainty
 from lightpen.formats.opened_files import InputFile, Inputs
 from lightpen.messages import Code
 from lightpen.model.limits import USUAL, SwingLimits
+from lightpen_extensions.comparisons.monte_carlo import run_trial, trials_of
 from lightpen_extensions.simulator.swings import paper_pen
 
 FILE = InputFile(Path("file"), 64 * "0")

@@ -17,11 +17,11 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import Rig
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.status import FailedSwing
+from lightpen_app.face import Services
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, set_tooltip
-from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_cards import PlotCard, PlotGrid
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
@@ -182,9 +182,9 @@ class ResidualsPanel(PlotsPanel):
 
 
 class UncertaintyPanel(PlotsPanel):
-    """Uncertainty budget of the tip, and the postures."""
+    """Uncertainty budget of the tip with its checks, and the postures."""
 
-    def __init__(self) -> None:
+    def __init__(self, services: Services = ()) -> None:
         # Widgets
         title = self.tr("U (k = 2) by source, weakest direction / mm")
         self._budget = BudgetPlot(Axes(title))
@@ -201,19 +201,22 @@ class UncertaintyPanel(PlotsPanel):
             ]
         )
         self._remark = text_label(TextSize.SMALL, Tone.QUIET)
-        self._monte_carlo = MonteCarloRow()
+        rows = (each.budget_row() for each in services)
+        self._checks = [row for row in rows if row is not None]
 
         # Layout
         self._layout.addWidget(self._remark)
-        self._layout.addWidget(self._monte_carlo)
+        fill(self._layout, *self._checks)
 
     @override
     def shut_down(self) -> None:
-        self._monte_carlo.stop()
+        for each in self._checks:
+            each.stop()
 
     @override
     def _show(self, solution: Solution) -> None:
-        self._monte_carlo.set_value(solution)
+        for each in self._checks:
+            each.set_value(solution)
         coverage = solution.calibration.coverage
         self._postures.set_data(coverage.tilts, coverage.directions)
         self._retranslate()

@@ -1,5 +1,6 @@
 """View of the step Review: the verdict, the result and its details."""
 
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -54,7 +55,7 @@ class DetailTabs(QTabWidget):
     # MethodsPanel: the tab of the methods is seen for the first time
     methods_made = Signal(object)
 
-    def __init__(self, run: SwingRun, place: SavePlace) -> None:
+    def __init__(self, run: SwingRun, place: SavePlace, services: Services) -> None:
         super().__init__()
         self._run = run
         self._place = place
@@ -64,7 +65,7 @@ class DetailTabs(QTabWidget):
         self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
             self._images,
             self._residuals,
-            LazyWidget(_make_uncertainty_panel),
+            LazyWidget(partial(_make_uncertainty_panel, services)),
             self._methods,
         )
         self._tab_of = {panel: PageScroll() for panel in self._panels}
@@ -141,10 +142,10 @@ def _make_residuals_panel() -> "PlotsPanel":
     return ResidualsPanel()
 
 
-def _make_uncertainty_panel() -> "PlotsPanel":
+def _make_uncertainty_panel(services: Services) -> "PlotsPanel":
     from lightpen_app.steps.review.plots_panel import UncertaintyPanel
 
-    return UncertaintyPanel()
+    return UncertaintyPanel(services)
 
 
 def _make_methods_panel() -> "PlotsPanel":
@@ -194,7 +195,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             ),
         )
         self.tools = ResultTools(export_formats(services))
-        self.tabs = self.say(DetailTabs(run, place), self.tr("Details"))
+        self.tabs = self.say(DetailTabs(run, place, services), self.tr("Details"))
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
         # Layout

@@ -30,7 +30,7 @@ the sum C, equation (21).
 Residuals of successive images are correlated. The factor on the noise follows from the
 autoregression (`noise_correlation`), or from the scatter between blocks of consecutive
 images (cluster-robust [1]_), equation (20), if that is significantly larger. Monte
-Carlo trials check the whole law (`lightpen.estimation.monte_carlo`).
+Carlo trials check the whole law (the extension `comparisons`).
 
 References
 ----------

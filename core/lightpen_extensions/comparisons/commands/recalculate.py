@@ -16,15 +16,15 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.monte_carlo import (
+from lightpen.formats.own_json import plain
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.recomputing import recompute
+from lightpen_extensions.comparisons.monte_carlo import (
     MIN_TRIALS,
     MonteCarlo,
     local_workers,
     run_monte_carlo,
 )
-from lightpen.formats.own_json import plain
-from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen.record.recomputing import recompute
 
 TITLE, COLUMN = 30, 13  # characters
 

@@ -15,12 +15,12 @@ from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, solve_record
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
-from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.steps.review.residual_plots import ResidualView
 from lightpen_app.widgets.live_markers import CameraSwitch
 from lightpen_app.widgets.result_plots import ArrowPlot
 from lightpen_app.widgets.state_banner import SignLabel
+from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,6 @@ from lightpen.swing.swing_recorder import (
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
-from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
@@ -85,8 +84,10 @@ from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
+from lightpen_app_extensions.comparisons.service import ComparisonsService
 from lightpen_app_extensions.exports.service import ExportsService
-from lightpen_app_extensions.report.control import PrintReportWindow
+from lightpen_app_extensions.report.control import PrintReportWindow, ReportService
 from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.scene_files import write_sample_files
@@ -225,7 +226,9 @@ class Bed:
     def show(self) -> ReviewPage:
         """Show the page."""
         with undressed():
-            page = ReviewPage(self.workbench, (ExportsService(self.workbench),))
+            kinds = ExportsService, ReportService, ComparisonsService
+            services = [kind(self.workbench) for kind in kinds]
+            page = ReviewPage(self.workbench, services)
         self.pages.append(page)
         self.qtbot.addWidget(page)
         page.resize(1000, 600)

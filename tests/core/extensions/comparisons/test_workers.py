@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.errors import Cancelled
-from lightpen.estimation.monte_carlo import local_workers
+from lightpen_extensions.comparisons.monte_carlo import local_workers
 
 
 def square(number: int) -> int:

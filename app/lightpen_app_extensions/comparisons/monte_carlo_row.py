@@ -2,17 +2,11 @@
 
 import os
 
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.estimation.monte_carlo import (
-    MIN_TRIALS,
-    MonteCarlo,
-    local_workers,
-    run_monte_carlo,
-)
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
+from lightpen_app.face import BudgetRow
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
@@ -25,11 +19,17 @@ from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import LatestJob, Report
+from lightpen_extensions.comparisons.monte_carlo import (
+    MIN_TRIALS,
+    MonteCarlo,
+    local_workers,
+    run_monte_carlo,
+)
 
 USUAL_TRIALS, MOST_TRIALS = 200, 10_000
 
 
-class MonteCarloRow(Translated, QWidget):
+class MonteCarloRow(Translated, BudgetRow):
     """Checks the budget of a solution by simulated calibrations, in other processes."""
 
     def __init__(self) -> None:
@@ -78,16 +78,16 @@ class MonteCarloRow(Translated, QWidget):
 
         self._retranslate()
 
+    @override
     def set_value(self, solution: Solution) -> None:
-        """Show another solution and discard the earlier result."""
         if solution is self._solution:
             return
         self.stop()
         self._solution, self._found, self._fault = solution, None, ""
         self._refresh()
 
+    @override
     def stop(self) -> None:
-        """Compute no more."""
         self._job.cancel()
 
     def _on_start_clicked(self) -> None:

@@ -1,4 +1,4 @@
-"""Tests of `lightpen.estimation.monte_carlo`."""
+"""Tests of `lightpen_extensions.comparisons.monte_carlo`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,14 +11,14 @@ from tests.simulated_centers import calibrate_pixels
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import DiameterReading
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.monte_carlo import (
+from lightpen.estimation.uncertainty.budget import center_errors
+from lightpen_extensions.comparisons.monte_carlo import (
     MonteCarlo,
     Trials,
     run_monte_carlo,
     run_trial,
     trials_of,
 )
-from lightpen.estimation.uncertainty.budget import center_errors
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
