@@ -176,7 +176,7 @@ NO_DISCS = Discs(
     *(DiscMoments(*9 * (_none,)), Levels(*3 * (_none,)), _none),
     np.zeros((0, 4), dtype=np.int64),
     *(_no, _no, _no, _no),
-    EdgeStarts(_nowhere, np.zeros((0, 2, 2)), _none, _nowhere),
+    EdgeStarts.anew(_nowhere, np.zeros((0, 2, 2))),
 )
 
 Starts: TypeAlias = Callable[[], EdgeStarts]  # at discs of the image before
@@ -212,11 +212,10 @@ def _nearest(starts: EdgeStarts, before: EdgeStarts) -> EdgeStarts:
     near = chosen_rows(before, gaps.argmin(axis=1))
     reach = 2 * np.sqrt(near.shapes[:, 0, 0] + near.shapes[:, 1, 1])
     known = gaps.min(axis=1) <= reach
-    return EdgeStarts(
-        np.where(known[:, None], starts.centers - near.offsets, starts.centers),
-        np.where(known[:, None, None], near.shapes, starts.shapes),
-        np.where(known, near.sigmas, np.nan),
-        starts.offsets,
+    return starts._replace(
+        centers=np.where(known[:, None], starts.centers - near.offsets, starts.centers),
+        shapes=np.where(known[:, None, None], near.shapes, starts.shapes),
+        sigmas=np.where(known, near.sigmas, np.nan),
     )
 
 

@@ -32,6 +32,7 @@ MIN_SIGMAS = 6.0  # least contrast in terms of the noise
 HOLE = 1.05  # times the light of a ring, with its middle filled; noise has less
 FULL = 254.5  # of 255, the plateau
 FULLY = 250  # of 255, the crest of a ring
+HOLLOW = 128  # of 255, the middle of a ring that is too uneven to be filled
 WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
 MARGIN = 5  # px around a box: the foot of the rim and some background
 ALIKE = 2  # times the smallest of a stack, at most, is its largest box
@@ -132,7 +133,7 @@ def _measured(
     _soften(light, low, high, soft)
     regions, contours, others = _regions(soft, frames, boxes)
     inner[...] = _inside(soft > FULL)
-    rings = _filled(soft, regions - frames[:, [0, 1, 0, 1]])
+    rings, are_hollow = _filled(soft, regions - frames[:, [0, 1, 0, 1]])
     if rings:  # with half of their light on their flanks
         levels.plateau[rings] = levels.top[rings]
         low, high = _ramp(levels, noise, floor)
@@ -168,17 +169,16 @@ def _measured(
     for k in np.flatnonzero(are_enough & ~are_clear & ~leave).tolist():
         rims[k] = rim_start(contours[k])
     rims[:, 1] -= np.arange(len(boxes)) * light.shape[1]
-    nothing = np.full(len(boxes), np.nan)
+    starts = EdgeStarts.anew(
+        rims[:, :2] + frames[:, :2], rims[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
+    )
+    are_hollow[rings] = True
     discs = Discs(
         *(moments, levels, low, regions),
         *(are_whole & ~leave, are_even & ~leave),
         leave_image=(reached & ends).any(axis=1),
         leave_window=(reached & ~ends).any(axis=1),
-        rims=EdgeStarts(
-            rims[:, :2] + frames[:, :2],
-            rims[:, [2, 3, 3, 4]].reshape(-1, 2, 2),
-            *(nothing, np.zeros((len(boxes), 2))),
-        ),
+        rims=starts._replace(are_rings=are_hollow),
     )
     box = np.flatnonzero(are_enough)
     if len(box) < len(boxes):
@@ -272,8 +272,8 @@ def _regions(
     return regions, outlines, others
 
 
-def _filled(soft: Reals, regions: IntArray) -> list[int]:
-    """Fill the dark middles of rings; return the windows with one."""
+def _filled(soft: Reals, regions: IntArray) -> tuple[list[int], BoolArray]:
+    """Fill the dark middles of rings; return windows with one, and all hollow ones."""
     # Half of a region's box, at places that a dark middle is not between.
     sides = np.stack(_sides(regions), axis=1)
     insets = sides.max(axis=1, keepdims=True) // 4
@@ -282,9 +282,10 @@ def _filled(soft: Reals, regions: IntArray) -> list[int]:
     there = first + (np.maximum(spans, 0)[..., None] * SHARES).astype(np.intp)
     columns, rows = there[:, 0], there[:, 1]
     each = np.arange(len(soft))[:, None, None]
-    middles = soft[each, rows[:, :, None], columns[:, None]]
-    are_dark = (middles.min(axis=(1, 2)) < FULLY) & (spans.min(axis=1) > 0)
-    return [k for k in np.flatnonzero(are_dark).tolist() if _is_filled(soft[k])]
+    middles = soft[each, rows[:, :, None], columns[:, None]].min(axis=(1, 2))
+    middles[spans.min(axis=1) <= 0] = FULL
+    dark = np.flatnonzero(middles < FULLY).tolist()
+    return [k for k in dark if _is_filled(soft[k])], middles < HOLLOW
 
 
 def _is_filled(soft: Reals) -> bool:

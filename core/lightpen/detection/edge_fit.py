@@ -14,7 +14,8 @@ wider blur adds ``p0 s g / sigma`` per px. So each ray shows d by linear least s
 with its own b, p0, p1, p2, and all rays of a disc share one matrix. The ellipse follows
 the d of all rays; a few rounds lead to the rim [1]_.
 
-Where d stays off the ellipse something hides the disc, or merges with it.
+Where d stays off the ellipse something hides the disc, or merges with it. A ring is
+fitted near its outer rim alone, with ``p1 = p2 = 0``: its dark middle is no parabola.
 
 References
 ----------
@@ -41,7 +42,8 @@ BESIDE = 0.5  # px from a ray to the lines that are read for it
 MIN_RAYS, MAX_RAYS = 32, 128
 # The unknowns of a ray are b, p0, p1, p0 d, p0 dsigma and p2. From afar p2 would lead
 # astray; in the end the blur is held.
-SHARPNESS, BEND = 4, 5
+SLOPE, SHARPNESS, BEND = 2, 4, 5
+STIFF = 1e6  # of the slope and bend of a ring
 CONVERGED = 0.05  # px
 
 
@@ -64,6 +66,7 @@ RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
 INSIDE, OUTSIDE = 3.0, 3.0  # reach of a ray in standard deviations of the blur
 MORE_INSIDE, MORE_OUTSIDE = 2.5, 1.0  # px beyond that
+INSIDE_RING = 2.2  # standard deviations of the blur
 MAX_INSIDE = 0.5  # of the shorter semi-axis: deeper, brightness is no parabola
 MIN_INSIDE = 3.5  # standard deviations of the blur: less shows little from it
 DEEPEST = 0.8  # of the shorter semi-axis, whatever the blur
@@ -103,12 +106,14 @@ class EdgeStarts(NamedTuple):
     sigmas: FloatArray
     # (N, 2), from the disc's centre to the region's in the previous image, px.
     offsets: FloatArray
+    are_rings: BoolArray  # (N,)
 
     @classmethod
     def anew(cls, centers: FloatArray, shapes: FloatArray) -> Self:
         """Return starts of discs that no previous image shows."""
-        nowhere = np.full((len(centers), 2), np.nan)
-        return cls(centers, shapes, nowhere[:, 0], nowhere)
+        n = len(centers)
+        nowhere = np.full((n, 2), np.nan)
+        return cls(centers, shapes, nowhere[:, 0], nowhere, np.zeros(n, dtype=bool))
 
 
 class _Ellipses(NamedTuple):
@@ -186,6 +191,7 @@ def _fit(
         return
     roots = np.asarray(np.linalg.cholesky(4 * starts.shapes[left]), dtype=np.float64)
     ellipses, sigmas = _Ellipses(starts.centers[left], roots), starts.sigmas[left]
+    rings = starts.are_rings[left]
     if not is_known:
         ellipses, sigmas = _onto_steepest(image, ellipses)
     for unknowns, n_rounds, rest in KNOWN_STAGES if is_known else STAGES:
@@ -194,7 +200,7 @@ def _fit(
             sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
             spacing = COARSE_SPACING if SHARPNESS in unknowns else RAY_SPACING
             rays = _rays(ellipses, spacing)
-            edges = _edges(image, rays, sigmas, shorter, unknowns)
+            edges = _edges(image, rays, sigmas, shorter, unknowns, rings)
             steps = _steps(rays, edges.places, edges.weights)
             moves = (rays.moves @ steps[..., None])[..., 0]
             longest = np.abs(moves).max(axis=1)
@@ -215,6 +221,7 @@ def _fit(
             sigmas = sigmas + edges.blurs
             if not alive.all():
                 left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
+                rings = rings[alive]
                 if not len(left):
                     return
             if at_rest[alive].all():
@@ -275,16 +282,20 @@ def _edges(
     sigmas: FloatArray,
     shorter_axes: FloatArray,
     unknowns: list[int],
+    are_rings: BoolArray,
 ) -> _Edges:
     """Return the edges along rays."""
     deepest = np.maximum(MAX_INSIDE * shorter_axes, MIN_INSIDE * sigmas)
     inside = np.minimum(INSIDE * sigmas + MORE_INSIDE, deepest)
     inside = np.minimum(inside, DEEPEST * shorter_axes)
+    inside = np.where(are_rings, np.minimum(inside, INSIDE_RING * sigmas), inside)
     reach = inside + OUTSIDE * sigmas + MORE_OUTSIDE
     s = -inside[:, None] + STEP * np.arange(ceil(float(reach.max()) / STEP))
     functions = _functions(s, sigmas, shorter_axes)[..., unknowns]
     functions *= (s < (reach - inside)[:, None])[..., None]
     squares = np.swapaxes(functions, 1, 2) @ functions
+    are_shape = np.isin(unknowns, (SLOPE, BEND))
+    squares += STIFF * are_rings[:, None, None] * np.diag(are_shape)
     inverse = functions @ np.linalg.inv(squares)
     fitted = _profiles(image, rays, s, is_coarse=BEND not in unknowns) @ inverse
     brightness = _smooth(fitted[..., 1], SMOOTHED)

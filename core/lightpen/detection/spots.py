@@ -121,11 +121,9 @@ class Spots:
         the pixel of this image where the next one, a part of the sensor, begins, px.
         """
         whole = self.flaws & (SpotFlaw.MERGED | SpotFlaw.CUT) == 0
-        return EdgeStarts(
-            self.centers[whole] - corner,
-            self.shapes[whole],
-            self.edge_widths[whole] / GAUSSIAN_RISE,
-            self.offsets[whole],
+        starts = EdgeStarts.anew(self.centers[whole] - corner, self.shapes[whole])
+        return starts._replace(
+            sigmas=self.edge_widths[whole] / GAUSSIAN_RISE, offsets=self.offsets[whole]
         )
 
     @property
