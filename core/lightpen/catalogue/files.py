@@ -149,7 +149,6 @@ MESSAGES = {
     "poses.no-transforms": "{name} has no transforms that move (Seq_Frame0000_StylusToTrackerTransform). Record the sequence with the transforms of the tracker.",
     "poses.far": "the translation is more than {most:g} m. Check its units: millimetres are needed.",
     "poses.no-header": "{name} has no header and {n_columns} columns. Poses have 7 (quaternion and translation), 12 or 16 (matrix), with a number or time before them. Put a header line on top: qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.",
-    "poses.twice": "pose {pose:g} is already given on line {line}. Remove the duplicate.",
     "poses.no-rotation": "r11 to r33 are not a rotation: their rows must have the length 1 and be at right angles to each other. Check the order of the columns.",
     "poses.mirrored": "r11 to r33 are a mirrored rotation (determinant -1). Give the poses in right-handed frames.",
     "camera-file.focal-length-sign": "{name} has the focal lengths {fx:g} and {fy:g} px; both must be positive. Export the file again, or calibrate the camera again.",

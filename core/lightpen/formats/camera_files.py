@@ -87,7 +87,7 @@ _SIZE = ("image_size", "resolution", "image_resolution", "img_size", "size")
 _MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix")
 _DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs"),
-    *("dist_coefficients", "distortion", "distortions", "dist", "D"),
+    *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
 )
 _COVARIANCE = ("intrinsics_covariance",)
 _DEVIATIONS = (
@@ -153,8 +153,9 @@ def _sensor_camera(entries: Entries) -> Camera:
         )
     if entries.has("intrinsics") and entries.has("camera_model"):
         return _from_kalibr(entries)
-    if _has_mapping(entries, "Intrinsics"):
-        entries = entries.part("Intrinsics")
+    holder = "Intrinsics" if len(entries.values) > 1 else next(iter(entries.values), "")
+    if _has_mapping(entries, holder):
+        return _sensor_camera(entries.part(holder))
     if entries.has("MappingCoefficients"):
         raise _fisheye(entries.name, "fisheyeIntrinsics")
     if entries.has("RadialDistortion") or entries.has("PrincipalPoint"):
@@ -284,6 +285,9 @@ def _fisheye(name: str | Message, model: str) -> FileError:
 
 def _size(entries: Entries) -> tuple[float, float]:
     if entries.has(*_SIZE) and not entries.has(*_WIDTH):
+        stated = entries.value(*_SIZE)
+        if isinstance(stated, dict) and "width" in stated:
+            return _size(entries.part(*_SIZE))
         width, height = entries.counted(2, *_SIZE)
         return width, height
     if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):

@@ -302,6 +302,13 @@ LAYOUTS = (
         lens=KANNALA_BRANDT,
     ),
     FileLayout(
+        "fisheye of OpenCV",
+        marks="DIM K D",
+        size="DIM",
+        numbers={"K": "fx skew cx - fy cy - - -", "D": "k1 k2 k3 k4"},
+        lens=KANNALA_BRANDT,
+    ),
+    FileLayout(
         "names alone",
         marks="fx fy cx cy",
         size="width|image_width height|image_height",
@@ -357,6 +364,8 @@ FOREIGN = (
     (r"\[ *\d+x\d+ +p\[|Intrinsic of \"", "RealSense (display)", _AS_TEXT),
     (r"(?m)^\[narrow_stereo", "ROS (ost.txt)", _AS_TEXT),
     (r"\barray\(\[", "Python (display)", _AS_TEXT),
+    (r"\A[\1-\x1f]\0{7}.\0{3}[\0-\x1f]\0{3}", "COLMAP (cameras.bin)", _AS_TEXT),
+    (r"(?m)^model_type:\W*(?i:scaramuzza)", "camodocal (Scaramuzza)", _BY_IMAGES),
     (r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|mtx_l)\b", "a stereo pair", _OF_PAIR),
     (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
     (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),

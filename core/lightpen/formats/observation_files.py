@@ -44,7 +44,7 @@ ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digit
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
 
 _FRAME = (
-    *("frame", "image", "frame_id", "frame_number", "frame_no", "frame_index"),
+    *("frame", "image", "frame_id", "image_id", "frame_number", "frame_no"),
     *("time", "timestamp", "timestamp_ns", "time_s", "t", "image_name", "filename"),
 )
 _LED = ("led", "led_id", "marker", "marker_id", "id")
@@ -164,7 +164,7 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
     Rotations given in few digits are replaced by the nearest rotations; those that are
     rotations to 1e-6 stay as they are. Rows without a pose are left out. ``tool`` is
     the name of one of several. Raises `FileError`, which names the line, for matrices
-    that are no rotations, poses given twice, or cells that are not numbers.
+    that are no rotations, or cells that are not numbers.
     """
     if path.name.lower().endswith(SEQUENCE_SUFFIXES):
         given = read_sequence(path, tool)
@@ -199,10 +199,6 @@ def _foreign_poses(given: GivenPoses, path: Path) -> PoseTable:
 
 def _own_poses(table: Table, path: Path) -> PoseTable:
     columns = _pose_columns(table)
-    if "pose" in table.header:
-        _check_repeated(table, table.numbers([table.header.index("pose")])[:, 0])
-    elif not table.header and columns[0] == 1:
-        _check_repeated(table, table.numbers([0])[:, 0])
     all_numbers = table.numbers_or_none(columns)
     is_seen: BoolArray = np.asarray(np.isfinite(all_numbers).all(axis=1))
     if not is_seen.any():
@@ -277,20 +273,6 @@ def _pose_columns(table: Table) -> list[int]:
     if table.n_columns not in (12, 13):  # with the number of the pose
         raise FileError("poses.no-header", name=table.name, n_columns=table.n_columns)
     return list(range(table.n_columns - 12, table.n_columns))
-
-
-def _check_repeated(table: Table, poses: FloatArray) -> None:
-    """Refuse a pose number that an earlier row has."""
-    _, first, which = np.unique(poses, return_index=True, return_inverse=True)
-    repeated = first[which] != np.arange(len(poses))
-    if np.any(repeated):
-        row = int(np.argmax(repeated))
-        raise table.error(
-            row,
-            message(
-                "poses.twice", pose=poses[row], line=table.lines[first[which[row]]]
-            ),
-        )
 
 
 def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:

@@ -131,13 +131,15 @@ def _tool(
 ) -> ToolColumns | None:
     """Return the tool of a block of columns; None if they are no whole pose."""
     places: dict[tuple[str, str], int] = {}
+    moving = [i for i in own if (role := roles[i]) is not None and role.kind == "t"]
+    is_moved = not all(_is_bare(table, i) for i in moving)
     for i in own:
         role = roles[i]
         if role is not None:
             key = role.kind, role.axis
-            if role.kind == "t" and role.axis in "xyz" and _is_bare(table, i):
+            if role.kind == "t" and is_moved and _is_bare(table, i):
                 # Beside tx ty tz, bare names w x y z are the quaternion.
-                key = ("t" if ("t", role.axis) not in places else "q"), role.axis
+                key = "q", role.axis
             places.setdefault(key, i)
     quaternion = [places.get(("q", axis)) for axis in "wxyz"]
     vector = [places.get(("v", axis)) for axis in "xyz"]

@@ -76,9 +76,9 @@ class Table:
                 wanted=wanted,
             )
         places = []
-        header = [re.sub(_IN_BRACKETS, "", name) for name in self.header]
+        header = list(map(_plain, self.header))
         for alternatives in names:
-            best = next(filter(header.__contains__, alternatives), None)
+            best = next(filter(header.__contains__, map(_plain, alternatives)), None)
             if best is None:
                 raise FileError(
                     "table.no-column",
@@ -224,6 +224,11 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     if not rows:
         raise FileError("table.only-header", name=name)
     return Table(name, header, rows, numbers)
+
+
+def _plain(name: str) -> str:
+    """Return the name of a column without unit and blanks."""
+    return re.sub(_IN_BRACKETS, "", name).replace(" ", "_")
 
 
 def _n_titles(rows: list[list[str]]) -> int:

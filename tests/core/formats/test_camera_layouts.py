@@ -103,6 +103,7 @@ def calib_io(**changes: float) -> dict[str, Any]:
     return {"Calibration": {"cereal_class_version": 0, "cameras": [camera]}}
 
 
+SIZE_NAMED = {"width": 1280, "height": 720}
 CALIB_IO_SIZE = '"imageHeight": 720, "imageWidth": 1280'
 FLAT = [each for row in MATRIX for each in row]
 PHOTONVISION: dict[str, Any] = {
@@ -230,6 +231,11 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(ORB_SLAM.replace("Camera1.", "Camera."), id="ORB-SLAM 2"),
         pytest.param(ZIVID, id="Zivid"),
         pytest.param(PLAIN, id="names alone"),
+        pytest.param({"camera": PLAIN}, id="within a name"),
+        pytest.param(
+            {"mtx": MATRIX, "dist_coeff": [BROWN], "img_size": SIZE_NAMED},
+            id="size by names",
+        ),
     ],
 )
 def test_one_camera_is_the_same_in_all_layouts(
@@ -365,6 +371,7 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("# oST version 5.0\n[image]\nwidth\n640\n\n[narrow_stereo]\n", "ost.txt"),
         ("{'mtx': array([[615., 0., 318.], [0., 615., 241.]])}", "Python (display)"),
         (f"%YAML:1.0\n---\nM1: {MATRIX}\nM2: {MATRIX}\n", "a stereo pair"),
+        (CAMODOCAL.replace("PINHOLE", "scaramuzza"), "Scaramuzza"),
         ("[cam_0]\nsize = [640, 480]\nrotation_count = 0\n", "no camera_matrix"),
         (CAMODOCAL.replace("PINHOLE", "MEI"), '"MEI"'),
         (f"image_width: 9\nimage_height: 9\nxi: 1.2\nK: {MATRIX}\n", "omnidirect"),
@@ -386,6 +393,7 @@ def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> 
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200), "jsonencode"),
         (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "cv2.FileStorage"),
         (b"\x89HDF\r\n\x1a\n" + bytes(80), "HDF5"),
+        (b"\1" + bytes(7) + b"\1\0\0\0\4" + bytes(43), "COLMAP"),
         (b"\x80\x04\x95\x10\x00\x00\x00\x00\x00\x00\x00}\x94(", "pickle"),
     ],
 )

@@ -234,13 +234,6 @@ def test_what_is_no_rotation_is_refused(
     assert sentence in text
 
 
-def test_a_pose_given_twice_is_named_with_both_lines(tmp_path: Path) -> None:
-    one, two = pose_lines(2)
-    text = refusal_of_poses(tmp_path, POSE_HEADER, one, two, one)
-    assert text.startswith("Line 4 of obs.csv: ")
-    assert "line 2" in text
-
-
 def test_a_translation_of_kilometres_is_refused(tmp_path: Path) -> None:
     text = refusal_of_poses(tmp_path, cells(np.eye(3), np.array([0, 0, 1e300])))
     assert "Line 1 of obs.csv: the translation is more than 1000 m" in text
