@@ -8460,10 +8460,6 @@ needed</source>
         <translation>端口超出范围</translation>
     </message>
     <message>
-        <source>pose {pose:g} is already given on line {line}. Remove the duplicate.</source>
-        <translation>位姿 {pose:g} 已在第 {line} 行给出。请删除重复复制的内容。</translation>
-    </message>
-    <message>
         <source>position</source>
         <translation>位置度</translation>
     </message>
