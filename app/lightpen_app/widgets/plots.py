@@ -341,7 +341,8 @@ class TracePlot(Plot):
             ]
         for item in (*self._curves, *self._marks):
             self._item.addItem(item)
-        place = {"position": 0.02, "anchors": [(0.0, 0.0), (0.0, 1.0)]}  # within the plot
+        # Below a line in the upper half: within the plot
+        place = {"position": 0.02, "anchors": [(0.0, 0.0), (0.0, 1.0)]}
         self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=place)
         self._limit.hide()
         self._item.addItem(self._limit)
