@@ -51,6 +51,7 @@ MESSAGES = {
     "warning.drift": "The cone moved by {distance:.4f} mm relative to the camera during the swing; U includes this. Clamp both, let the camera warm up, and repeat the swing.",
     "warning.led-file-contradicted": "The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.",
     "warning.lens-field": "The lens deviates by {size:.3f} px (RMS) from its distortion model; the result is corrected and U includes the rest. Calibrate the camera with views that fill the image; its file then states the lens field.",
+    "warning.pen-bends": "The LEDs move by {size:.3f} px (RMS) against each other with the tilt of the pen: it bends under its weight, or LEDs are loose. The result is corrected and U includes the rest. Stiffen the pen, and check how the LEDs are fixed.",
     "warning.camera-tilt": "The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.",
     "time.us": "{value:.3g} µs",
     "time.ms": "{value:.3g} ms",

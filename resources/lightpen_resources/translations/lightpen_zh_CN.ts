@@ -5752,6 +5752,10 @@ needed</source>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
     <message>
+        <source>The LEDs move by {size:.3f} px (RMS) against each other with the tilt of the pen: it bends under its weight, or LEDs are loose. The result is corrected and U includes the rest. Stiffen the pen, and check how the LEDs are fixed.</source>
+        <translation>各 LED 随光笔倾斜相互移动 {size:.3f} px（均方根）：光笔因自重弯曲，或 LED 松动。结果已修正，其余部分计入 U。请加固光笔，并检查 LED 的固定。</translation>
+    </message>
+    <message>
         <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres or inches, state the unit, for example in the header: x_m, y_m, z_m.</source>
         <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米或英寸，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
     </message>

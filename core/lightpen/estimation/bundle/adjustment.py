@@ -71,7 +71,7 @@ def search_fields(bundle: Bundle, pixels: FloatArray) -> tuple[SearchedField, ..
     """
     state, known = bundle.state, bundle.unknowns.fields
     fitted = {(each.name, each.camera) for each in known}
-    every = image_fields(pixels, bundle.used, state.rig.cameras, state.rotations)
+    every = image_fields(pixels, bundle.used, state)
     fields = [each for each in every if (each.name, each.camera) not in fitted]
     if not fields:
         return ()
@@ -107,11 +107,11 @@ class FoundField:
     @property
     def message(self) -> Message:
         """The message to the user: kind and size, and the remedy."""
-        finding = (
-            message("warning.lens-field", size=self.size)
-            if self.name is FieldName.LENS
-            else message("warning.camera-tilt", size=self.size)
-        )
+        finding = {
+            FieldName.LENS: message("warning.lens-field", size=self.size),
+            FieldName.TILT: message("warning.camera-tilt", size=self.size),
+            FieldName.BEND: message("warning.pen-bends", size=self.size),
+        }[self.name]
         return of_camera(self.camera, finding) if self.camera else finding
 
 
@@ -125,10 +125,11 @@ def found_fields(bundle: Bundle) -> tuple[FoundField, ...]:
         strict=True,
     ):
         if field.is_supported(component) and np.isfinite(component.gain):
-            seen = bundle.used[:, field.camera]
-            shifts = field.columns[:, field.camera] @ bundle.values[place]
-            size = float(np.sqrt(np.mean(shifts[seen] ** 2)))
-            camera = names[field.camera] if names else ""
+            at = field.camera
+            of = slice(None) if at is None else at
+            shifts = field.columns[:, of] @ bundle.values[place]
+            size = float(np.sqrt(np.mean(shifts[bundle.used[:, of]] ** 2)))
+            camera = "" if at is None or not names else names[at]
             found.append(FoundField(field.name, camera, size, component.gain))
     return tuple(sorted(found, key=lambda each: -each.gain))
 
@@ -310,7 +311,7 @@ def _fit_consistent(
         fit = partial(fit, noise=of_centers)
         bundle = fit(priors, begin=bundle)
     # With all fields at once: what seat and drift would absorb of one is its own.
-    every = image_fields(pixels, bundle.used, rig.cameras, state.rotations)
+    every = image_fields(pixels, bundle.used, bundle.state)
     among = fit(priors, fields=every, begin=bundle)
     both = zip(every, among.components.fields, strict=True)
     fields = tuple(each for each, found in both if each.is_supported(found))

@@ -8,7 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.bundle.linearised import N_CONE
+from lightpen.estimation.bundle.linearised import (
+    N_CONE,
+    BundleState,
+    views_at,
+    whole_moves,
+)
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import chi_square_quantile, symmetric_root
 from lightpen.model.fisheye import correlation
@@ -102,13 +107,14 @@ class FieldName(StrEnum):
 
     LENS = "lens"
     TILT = "camera tilt"
+    BEND = "pen bend"
 
 
 # How often chance alone supports a field, at most. One lens field too many hardly costs
 # accuracy; a tilt too many may cost several standard uncertainties of the tip.
-CHANCE = {FieldName.LENS: 0.1, FieldName.TILT: 0.01}
-# Largest standard deviations, px, of a tilt by the sine of the lean.
-LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3}
+CHANCE = {FieldName.LENS: 0.1, FieldName.TILT: 0.01, FieldName.BEND: 0.1}
+# Largest standard deviations: px, of a tilt by the sine of the lean; of a bend, mm.
+LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}
 
 
 class FieldComponent(NamedTuple):
@@ -124,7 +130,7 @@ class ImageField:
     """One field with k unknowns, px."""
 
     name: FieldName
-    camera: int  # index of the camera whose images it shifts
+    camera: int | None  # index of the camera whose images it shifts; None: of all
     # (N, C, L, 2, k), derivative of the LEDs' images
     columns: FloatArray
     # Each (k, k), possible covariances for a standard deviation of 1 px.
@@ -185,16 +191,14 @@ def _costs(
 
 
 def image_fields(
-    pixels: FloatArray,
-    used: BoolArray,
-    cameras: tuple[Camera, ...],
-    rotations: FloatArray,
+    pixels: FloatArray, used: BoolArray, state: BundleState
 ) -> tuple[ImageField, ...]:
-    """Return the fields of lenses and of cameras that turn with the lean.
+    """Return the fields of lenses, of cameras that turn with the lean, and of the pen.
 
     By the LED centres ``pixels`` (N, C, L, 2), px, that are ``used`` (N, C, L), in
-    images of ``rotations`` rig_from_pen (N, 3, 3).
+    images at a state.
     """
+    cameras, rotations = state.rig.cameras, state.rotations
     lenses = [_lens(camera, c, pixels, used) for c, camera in enumerate(cameras)]
     lean = rotations[:, :, 1] @ axes_of_cone(rotations)[:2].T
     lean -= lean.mean(axis=0)
@@ -203,7 +207,35 @@ def image_fields(
         columns = np.zeros((*pixels.shape, 4))
         columns[:, c, :, 0, :2] = columns[:, c, :, 1, 2:] = lean[:, None]
         tilts.append(ImageField(FieldName.TILT, c, columns, (np.eye(4),)))
-    return (*lenses, *tilts)
+    return (*lenses, *tilts, _bend(pixels, state))
+
+
+def _bend(pixels: FloatArray, state: BundleState) -> ImageField:
+    """Return the shifts of a pen that bends under its weight as it leans.
+
+    By the deflection of the highest LED, pen horizontal, mm: it grows with the square
+    of the height, and moves of the pen as a whole are none.
+    """
+    pen = state.pen
+    views = views_at(state, pixels)
+    by_led = np.stack([view.led for view in views], axis=1)
+    axis = pen.leds.mean(axis=0) - state.tip_pen
+    axis /= np.linalg.norm(axis)
+    heights = pen.leds @ axis
+    shares = ((heights - heights.min()) / max(np.ptp(heights), 1e-9)) ** 2
+    across = np.linalg.svd(axis[None])[2][1:]  # two directions, (2, 3)
+    moves = (shares[:, None] * across[:, None]).reshape(2, -1).T
+    whole = whole_moves(pen.leds)
+    moves -= whole @ np.linalg.lstsq(whole, moves, rcond=None)[0]
+    fall = -(axes_of_cone(state.rotations)[2] @ state.rotations) @ across.T
+    columns = np.einsum(
+        "nclik,lkd,nd->ncli",
+        by_led,
+        moves.reshape(-1, 3, 2),
+        fall - fall.mean(axis=0),
+        optimize=True,
+    )
+    return ImageField(FieldName.BEND, None, columns[..., None], (np.eye(1),))
 
 
 def _lens(camera: Camera, c: int, pixels: FloatArray, used: BoolArray) -> ImageField:

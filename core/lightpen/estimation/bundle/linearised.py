@@ -13,7 +13,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import disc_residuals
 from lightpen.estimation.contact.joint import TURN_RIDGE
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import Rig
+from lightpen.model.rigid import Rig, skew
 
 N_TURN = 3
 N_CONE = 3
@@ -273,3 +273,13 @@ def n_eliminated(each: Eliminated, jitter: FloatArray | None, used: BoolArray) -
     left = each.nuisance_covariance[:, N_TURN:, N_TURN:]
     freedom = N_CONE - np.einsum("nij,ji->n", left, known)
     return float(N_TURN * n_images + freedom.sum())
+
+
+def whole_moves(leds: FloatArray) -> FloatArray:
+    """Return the LED moves caused by rigid moves, (3 L, 6).
+
+    Its shifts, mm, and its turns about the middle of the LEDs, rad.
+    """
+    shifts = np.tile(np.eye(3), (len(leds), 1))
+    turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
+    return np.concatenate([shifts, turns], axis=1)

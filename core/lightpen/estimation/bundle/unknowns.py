@@ -27,6 +27,7 @@ from lightpen.estimation.bundle.linearised import (
     CameraView,
     NormalEquations,
     views_at,
+    whole_moves,
 )
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.variance_components import (
@@ -38,7 +39,7 @@ from lightpen.estimation.variance_components import (
 )
 from lightpen.model.coverage import EXACT, inverse, known_by
 from lightpen.model.pen import effective_tip
-from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen.model.rigid import rotation_from_vector
 
 NONE = Component(0.0, 0.0)
 
@@ -346,16 +347,6 @@ class Unknowns:
 def led_basis(leds: FloatArray) -> FloatArray:
     """Return a basis of LED moves without rigid moves and scale, (3 L, 3 L - 6)."""
     return np.asarray(np.linalg.qr(whole_moves(leds), mode="complete")[0][:, 6:])
-
-
-def whole_moves(leds: FloatArray) -> FloatArray:
-    """Return the LED moves caused by rigid moves, (3 L, 6).
-
-    Its shifts, mm, and its turns about the middle of the LEDs, rad.
-    """
-    shifts = np.tile(np.eye(3), (len(leds), 1))
-    turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
-    return np.concatenate([shifts, turns], axis=1)
 
 
 # Joint estimation of all variance components.

@@ -13,7 +13,7 @@ noise             (15)      image noise, enlarged where it is correlated or scat
 seat              (15-17)   jitter, and waves beyond the form error
 ball and cone     (17)      form error, assumed
 drift             (17)      of cone against camera
-led geometry      (17)      errors of the LED file: coordinates, normals, domes
+led geometry      (17)      errors of the LED file, and a pen that bends
 disc diameter     (16)      prior or measurement
 camera            (16-17)   prior of the intrinsics; a camera that turns with the lean
 lens              (17-18)   field of the lens; centres off alike in every posture
@@ -49,9 +49,8 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment, SearchedField
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.image_fields import MODE_COUNTS, FieldName
-from lightpen.estimation.bundle.linearised import N_CONE
+from lightpen.estimation.bundle.linearised import N_CONE, whole_moves
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
@@ -200,6 +199,7 @@ def contributions_of(
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
     leds = bundle.component_contribution(at.leds) + _of_faces(bundle)
+    leds += _of_fields(bundle, fields, FieldName.BEND)
     lens = center_errors(bundle, n_images) + _of_fields(bundle, fields, FieldName.LENS)
     camera = _of_cameras(bundle) + _of_fields(bundle, fields, FieldName.TILT)
     shares = [

@@ -28,7 +28,7 @@ from lightpen_extensions.simulator.swings import (
 
 CAMERA, PEN = paper_camera(), paper_pen()
 N_IMAGES, SIGMA = 120, 0.03
-LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3}  # px
+LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}  # px, mm
 
 
 def swing(seed: int = 0) -> tuple[Swing, np.random.Generator]:
@@ -117,6 +117,24 @@ def test_a_camera_that_turns_with_the_lean_is_found() -> None:
     assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
 
 
+def test_a_pen_that_bends_as_it_leans_is_found() -> None:
+    """The highest LED falls by 0.06 mm with the pen horizontal."""
+    true, rng = swing()
+    heights = PEN.leds[:, 1:2] - PEN.leds[:, 1].min()
+    fall = true.rotations[:, 1] * [1, 0, 1]  # gravity in the pen, across it
+    pixels = []
+    for R, T, down in zip(true.rotations, true.translations, fall, strict=True):
+        bends = 0.06 * (heights / heights.max()) ** 2 * down
+        pen = replace(PEN, leds=PEN.leds + bends)
+        pixels.append(simulate_centers(CAMERA, pen, R[None], T[None], SIGMA, rng)[0])
+    found = calibrate_pixels(np.array(pixels), CAMERA, PEN)
+    bend = only(found, FieldName.BEND)
+    assert bend.is_certain
+    assert 0.005 < bend.size < 0.012  # px
+    fitted = found.bundle.values[found.bundle.layout.fields[-1]]
+    np.testing.assert_allclose(fitted, 0.06, rtol=0.3)
+
+
 @pytest.mark.parametrize("name", FieldName)
 @pytest.mark.parametrize("times", [0.1, 2.0, 5.0, 1e6])
 def test_the_size_of_one_unknown_is_that_of_its_likelihood(
@@ -134,7 +152,7 @@ def test_the_size_of_one_unknown_is_that_of_its_likelihood(
     best = int(np.argmin(costs))
     assert found.sigma == pytest.approx(sizes[best])
     assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
-    needed = {FieldName.LENS: 2.7055, FieldName.TILT: 6.6349}[name]
+    needed = 6.6349 if name is FieldName.TILT else 2.7055
     assert field.is_supported(found) == (-costs[best] > needed)
     likely = 0.6 / 60 * np.exp(-0.5 * (costs - costs.min()))
     likely /= likely.sum() + 0.4 * np.exp(0.5 * costs.min())
@@ -150,7 +168,11 @@ def test_what_a_file_states_of_its_lens_is_taken_as_it_is() -> None:
 
 @pytest.mark.parametrize(
     ("name", "code"),
-    [(FieldName.LENS, "warning.lens-field"), (FieldName.TILT, "warning.camera-tilt")],
+    [
+        (FieldName.LENS, "warning.lens-field"),
+        (FieldName.TILT, "warning.camera-tilt"),
+        (FieldName.BEND, "warning.pen-bends"),
+    ],
 )
 def test_each_field_has_a_message_that_names_its_camera_if_it_has_one(
     name: FieldName, code: str

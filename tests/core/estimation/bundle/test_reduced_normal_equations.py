@@ -93,7 +93,7 @@ def test_rows_of_images_add_up_to_the_system_of_the_unknowns(
     pixels = simulate_rig_centers(rig, pen, swing, 0.05, rng)
     used = np.isfinite(pixels[..., 0]) & (rng.random(pixels.shape[:-1]) < 0.9)
     pixels[~used] = np.nan
-    fields = image_fields(pixels, used, rig.cameras, state.rotations)
+    fields = image_fields(pixels, used, state)
     unknowns = Unknowns.of(
         *(state, priors_of(rig, pen, USUAL)),
         seat_modes_of(state.rotations, rng.standard_normal((9, 1))),
