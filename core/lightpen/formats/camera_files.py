@@ -104,6 +104,7 @@ _FIELD_ENTRIES = (
     *_COVARIANCE,
 )
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "radial_tangential", "none"}
+_FLAG = ("fisheye", "fisheye_model")  # of caliscope, and of samples of OpenCV
 _FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
 _MONTHS = [
     *("Jan", "Feb", "Mar", "Apr", "May", "Jun"),
@@ -265,7 +266,8 @@ def _from_matlab(entries: Entries) -> Camera:
 
 
 def _lens(entries: Entries) -> LensModel:
-    if entries.has("fisheye") and str(entries.value("fisheye")).casefold() == "true":
+    flag = str(entries.value(*_FLAG)) if entries.has(*_FLAG) else ""
+    if flag.casefold() in ("true", "1"):
         return LensModel.KANNALA_BRANDT
     model = entries.word("distortion_model").casefold().replace("-", "_")
     if model in _FISHEYE:

@@ -456,7 +456,7 @@ def _pinhole(
     fy = named.get("fy", f * named.get("aspect", 1.0))
     centre = np.zeros(2)
     for i, (own, off) in enumerate((("cx", "dx"), ("cy", "dy"))):
-        if own not in named and off not in named:
+        if own not in named and off not in layout.numbers.values():
             raise FileError("entry.missing", name=entries.name, entry=own)
         centre[i] = named.get(own, size[i] / 2 + named.get(off, 0.0)) - layout.first
     return np.array([fx, fy, *centre])

@@ -418,7 +418,9 @@ def _rows_by_tool(table: Table, tools: Sequence[ToolColumns]) -> dict[str, list[
     """Return the rows of each tool, where a column names one in each row."""
     poses = {i for each in tools for i in (*each.translation, *each.quaternion)}
     for column, name in enumerate(table.header):
-        if column in poses or not re.fullmatch(_TOOL_COLUMN, name):
+        if column in poses or re.fullmatch(_STATE, name):
+            continue
+        if not re.fullmatch(_TOOL_COLUMN, name):
             continue
         rows: dict[str, list[int]] = {}
         for i, row in enumerate(table.rows):

@@ -255,6 +255,9 @@ def test_one_camera_is_the_same_in_all_layouts(
         CALISCOPE.replace("port = 0", "fisheye = true").replace(
             str([*BROWN, 0.0]), str([*FISHEYE])
         ),
+        CALISCOPE.replace("port = 0", "fisheye_model = 1").replace(
+            str([*BROWN, 0.0]), str([*FISHEYE])
+        ),
         f"1 OPENCV_FISHEYE 1280 720 1320.5 1318.25 652.75 356.25 "
         f"{' '.join(map(str, FISHEYE))}\n",
         METASHAPE.replace("frame", "fisheye")
@@ -265,7 +268,7 @@ def test_one_camera_is_the_same_in_all_layouts(
         REALSENSE | {"model": "Kannala Brandt4", "coeffs": [*FISHEYE, 0]},
         GYROFLOW,
     ],
-    ids=["caliscope", "COLMAP", "Metashape", "RealSense", "Gyroflow"],
+    ids=["caliscope", "OpenCV", "COLMAP", "Metashape", "RealSense", "Gyroflow"],
 )
 def test_a_fisheye_is_read(tmp_path: Path, text: str | dict[str, Any]) -> None:
     found = read(tmp_path, text)
@@ -311,6 +314,12 @@ def test_metashape_projects_as_its_manual_says(tmp_path: Path) -> None:
     pixel = found.project(np.array([X, Y, Z]))
 
     np.testing.assert_allclose(pixel, [u - 0.5, v - 0.5], rtol=1e-13)
+
+
+def test_metashape_leaves_out_a_principal_point_in_the_middle(tmp_path: Path) -> None:
+    text = METASHAPE.replace("  <cx>12.75</cx>\n", "")
+
+    assert read(tmp_path, text).cx == 640 - 0.5
 
 
 def test_rational_coefficients_are_kept(tmp_path: Path) -> None:
@@ -431,7 +440,7 @@ def test_several_cameras_are_counted(
         (COLMAP.replace(" -0.0004", ""), "7 parameters of the model OPENCV"),
         (without(PHOTONVISION, "resolution"), "does not state the image size"),
         (without(REALSENSE, "fx"), "no f"),
-        (METASHAPE.replace("<cx>12.75</cx>", ""), "no cx"),
+        (without(NERFSTUDIO, "cx"), "no cx"),
         (MRCAL.replace("0., 0., 0., 0.,]", "1, " * 20 + "]"), "numbers where 18"),
     ],
 )

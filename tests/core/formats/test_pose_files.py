@@ -102,7 +102,7 @@ def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> No
 def test_a_pose_that_a_flag_calls_invalid_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     rows = [f"{i % 3},1,0,0,0,{i + 1},2,900" for i in range(6)]
-    path.write_text("\n".join(["visible,qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
+    path.write_text("\n".join(["tool is visible,qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
 
     assert read_poses(path).places.tolist() == [2, 3, 5, 6]
 
