@@ -50,7 +50,6 @@ class RowWords:
     # Label of each button, and its accessible name.
     resume: tuple[str, str]
     discard: tuple[str, str]
-    keep: tuple[str, str]
 
 
 class InterruptedWork:

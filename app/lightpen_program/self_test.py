@@ -20,7 +20,6 @@ from threading import Lock, Timer
 from traceback import extract_stack
 from types import TracebackType
 
-from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
@@ -28,11 +27,13 @@ from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.live.sources import SourceEnvironment
+from lightpen.local_time import local_now
 from lightpen.model.limits import SwingLimits
-from lightpen.record.results.result_folder import RECORDS, RESULTS, FolderArchive
-from lightpen.record.results.results import Result
+from lightpen.record.results.acceptance import accept
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.solving import solve_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.swing_recorder import record_header
@@ -64,7 +65,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Tip:
-    """The tip that the wizard found, and the true one: x, y, z, pen frame, mm."""
+    """The tip that was found, and the true one: x, y, z, pen frame, mm."""
 
     found_mm: list[float]
     true_mm: list[float]
@@ -82,7 +83,6 @@ class Report:
     versions: dict[str, str] = field(default_factory=dict)
     is_complete: bool = False
     last_lines: Callable[[], Sequence[str]] = tuple  # of the log
-    doing: Callable[[], str] = str  # returns the current step
     # Where each thread was when the test was given up, by its name.
     threads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
@@ -121,7 +121,6 @@ class Report:
             "tip": None if self.tip is None else asdict(self.tip),
             "screenshot": self.screenshot,
             "log": list(self.last_lines()),
-            "doing": self.doing(),
             "threads": self.threads,
         }
         with self._lock:
@@ -175,7 +174,7 @@ OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "python_calamine")
 def test_program(file: Path) -> int:
     """Test the installation, write a report, and return the exit status.
 
-    The report is written in any case, with a picture of the wizard beside it.
+    The report is written in any case, with a picture of the window beside it.
     """
     report = Report(file)
     try:
@@ -221,15 +220,12 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
         found.append(desk.tested_fonts())
     with report.check("record") as found:
         found.append(desk.tested_record())
-    with report.check("wizard") as found:
-        report.doing = desk.doing
+    with report.check("window") as found:
         picture = report.file.with_suffix(".png")
-        found.append(desk.walked_wizard(picture))
+        found.append(desk.drawn_window(picture))
         report.screenshot = str(picture)
-    with report.check("result") as found:
-        found.append(desk.tested_result())
     with report.check("tip") as found:
-        report.tip = tip = desk.tip()
+        report.tip = tip = desk.accepted_tip()
         found.append(_judged(tip))
     report.is_complete = True
 
@@ -270,7 +266,6 @@ def _give_up(report: Report) -> None:
     os._exit(HUNG)
 
 
-TICK_MS = 50
 # The classes to which a platform gives fonts of its own.
 CLASSES_WITH_FONTS = (
     "QAbstractItemView",
@@ -283,69 +278,6 @@ CLASSES_WITH_FONTS = (
     "QTableView",
     "QTreeView",
 )
-
-
-class Walk(QObject):
-    """Opens an interrupted swing, ends it, reviews it and accepts its tip."""
-
-    ended = Signal()  # the tip is accepted
-
-    def __init__(self, wizard: Wizard, swing: Path) -> None:
-        super().__init__(wizard)
-        self._window = wizard.window
-        self._workbench = wizard.workbench
-        self._swing = swing
-        self._next: Callable[[], bool] = self._open
-        self.doing = ""  # the awaited event, and the texts of the window
-        self._timer = QTimer(self, interval=TICK_MS)
-        self._timer.timeout.connect(self._on_tick)
-
-    def start(self) -> None:
-        """Begin on the first page."""
-        self._timer.start()
-
-    def _on_tick(self) -> None:
-        self.doing = f"{self._next.__name__}: {', '.join(self._window.words())}"
-        if self._next():
-            self._timer.stop()
-            self.ended.emit()
-
-    def _open(self) -> bool:
-        self._workbench.run.open_requested.emit(self._swing)
-        self._next = self._finish
-        return False
-
-    def _finish(self) -> bool:
-        status = self._workbench.run.status
-        is_whole = status.verdict is not None  # its tip was computed at once
-        if self._window.page().key == "swing" and (status.is_capturing or is_whole):
-            if not is_whole:
-                self._workbench.run.runner.ask(lambda workflow: workflow.finish())
-            self._next = self._review
-        return False
-
-    def _review(self) -> bool:
-        status = self._workbench.run.status
-        if status.verdict is None:
-            return False
-        if not status.verdict.can_be_accepted:
-            raise SelfTestError(f"The tip cannot be accepted: {status.verdict}.")
-        if self._window.page().key == "review":
-            self._next = self._accept
-        else:
-            self._press_main()
-        return False
-
-    def _accept(self) -> bool:
-        if self._workbench.run.status.result is not None:
-            return True
-        self._press_main()
-        return False
-
-    def _press_main(self) -> None:
-        """Press the main button, which takes no key at once."""
-        if not self._window.page().main_action().why_not:
-            self._window.press_main()
 
 
 N_IMAGES = 60
@@ -401,7 +333,6 @@ class Desk:
         self._files = folder / "files"
         self._settings = folder / "lightpen.json"
         self._record = self._data / RECORDS / "self-test"
-        self._walk: Walk | None = None
         if not has_display():
             os.environ["QT_QPA_PLATFORM"] = "offscreen"
         self._application = make_application(sys.argv[:1])
@@ -440,12 +371,11 @@ class Desk:
             raise SelfTestError(f"{n_images} of {N_IMAGES} images came back.")
         return f"{n_images} images written and read back"
 
-    def walked_wizard(self, picture: Path) -> str:
-        """Have the wizard find and accept the tip of the swing; draw it at its end."""
+    def drawn_window(self, picture: Path) -> str:
+        """Show the window until all pages are made, and draw it."""
         around = SourceEnvironment(SceneSimulator(SCENE), SkippingClock(rests=True))
         settings = Settings(self._settings)
         wizard = Wizard(self._application, faces(), settings, self._data, around)
-        self._walk = walk = Walk(wizard, self._record)
         faults: list[str] = []
 
         def end() -> None:
@@ -461,39 +391,26 @@ class Desk:
             wizard.window.close_unasked()
 
         previous, sys.excepthook = sys.excepthook, give_up
-        walk.ended.connect(end)
         wizard.workbench.notifications.raised.connect(
             lambda text, _: faults.append(text)
         )
         wizard.show()
-        wizard.started.connect(walk.start)
+        wizard.started.connect(end)
         try:
             self._application.exec()
         finally:
             sys.excepthook = previous
         if faults:
             raise SelfTestError(" ".join(faults))
-        return "opened, finished, reviewed and accepted"
+        return "drawn"
 
-    def doing(self) -> str:
-        """Return what the walk through the wizard waits for; it may run or hang."""
-        return "" if self._walk is None else self._walk.doing
-
-    def tested_result(self) -> str:
-        """Return pen, folder and grade of the accepted result, which is current."""
-        return f"{self._result().names.pen} in {RESULTS}, grade {self._result().grade}"
-
-    def tip(self) -> Tip:
-        """Return the tip of the accepted result, and the true one."""
-        result = self._result()
+    def accepted_tip(self) -> Tip:
+        """Find and accept the tip of the swing; return it and the true one."""
+        archive = FolderArchive(self._data)
+        accept(archive, solve_record(open_record(self._record)), local_now())
+        result = archive.in_force(NAMES.pen, NAMES.tip, is_simulated=True)
+        if result is None:
+            raise SelfTestError("The accepted result is not current.")
         return Tip(
             result.tip_pen.tolist(), SCENE.tip_pen.tolist(), result.uncertainty.tolist()
         )
-
-    def _result(self) -> Result:
-        result = FolderArchive(self._data).in_force(
-            NAMES.pen, NAMES.tip, is_simulated=True
-        )
-        if result is None:
-            raise SelfTestError("The accepted result is not current.")
-        return result

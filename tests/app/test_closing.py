@@ -61,7 +61,7 @@ def face(workbench):
     QTimer.singleShot(500, close)
     return Service(workbench)
 
-sys.exit(run([face]))
+sys.exit(run([face], None))
 """
 
 # A signal that whoever started the tests ignores would be ignored by the program, too.
@@ -102,7 +102,7 @@ def face(workbench):
     QTimer.singleShot(500, lambda: swing(workbench))
     return Service(workbench)
 
-sys.exit(run([face]))
+sys.exit(run([face], None))
 """
 
 
@@ -296,7 +296,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     assert took < TIMEOUT / 2000  # the computation goes on twice as long
     assert_whole(folder, N_IMAGES)
     again = open_wizard()
-    again.until_says("Interrupted swing")
+    again.until_says("Interrupted: 1")
     again.click("Resume")
     again.until_shows("Swing")
     assert n_kept(again.workbench) == N_IMAGES

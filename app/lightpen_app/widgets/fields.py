@@ -6,13 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, Signal, SignalInstance
-from PySide6.QtGui import (
-    QAction,
-    QKeyEvent,
-    QPaintEvent,
-    QStandardItemModel,
-    QWheelEvent,
-)
+from PySide6.QtGui import QAction, QKeyEvent, QStandardItemModel, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
@@ -24,9 +18,6 @@ from PySide6.QtWidgets import (
     QMenu,
     QPushButton,
     QSizePolicy,
-    QStyle,
-    QStyleOptionFrame,
-    QStylePainter,
     QTabBar,
     QTabWidget,
     QWidget,
@@ -90,24 +81,8 @@ QUOTES = "\"'"
 class EnterEdit(QLineEdit):
     """A line edit whose Enter key only ends editing.
 
-    Where nothing was edited, Enter is left to the window. Without the focus it shows
-    the end of a text that is too long.
+    Where nothing was edited, Enter is left to the window.
     """
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        option = QStyleOptionFrame()
-        self.initStyleOption(option)
-        line = QStyle.SubElement.SE_LineEditContents
-        area = self.style().subElementRect(line, option, self).adjusted(2, 0, -2, 0)
-        left = Qt.TextElideMode.ElideLeft
-        shown = self.fontMetrics().elidedText(self.text(), left, area.width())
-        if self.hasFocus() or shown == self.text():
-            super().paintEvent(event)
-            return
-        painter = QStylePainter(self)
-        painter.drawPrimitive(QStyle.PrimitiveElement.PE_PanelLineEdit, option)
-        painter.drawText(area, Qt.AlignmentFlag.AlignVCenter, shown)
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

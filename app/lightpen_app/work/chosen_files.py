@@ -9,12 +9,10 @@ from PySide6.QtCore import QObject, QStandardPaths
 
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import SourceEnvironment
-from lightpen.model.names import Origin
 from lightpen.record.exports import export_stem
 from lightpen.record.swings.solving import FilesBeside
 from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
 from lightpen_app.look.languages import worded
-from lightpen_app.look.phrases import origin_text
 from lightpen_app.work.job import Job, Notifications, Report
 from lightpen_app.work.selection import Selection, trial_of
 from lightpen_app.work.settings import FilePaths, Settings
@@ -212,11 +210,6 @@ class SavePlace:
     def remember(self, folder: Path) -> None:
         """Offer this folder from now on."""
         self.settings.set_export_folder(str(folder))
-
-    def mark(self) -> str:
-        """Return the mark on pictures; empty for a live camera."""
-        origin = self.run.status.origin
-        return "" if origin in (None, Origin.LIVE) else origin_text(origin)
 
     def stem(self) -> str:
         """Return the beginning of a file name."""

@@ -255,10 +255,6 @@ class _Interrupted(InterruptedWork):
                 translate("VerificationRow", "Close verification"),
                 translate("VerificationRow", "Close the verification of {0}"),
             ),
-            (
-                translate("VerificationRow", "Keep"),
-                translate("VerificationRow", "Keep the verification of {0}"),
-            ),
         )
 
     @override

@@ -1,6 +1,6 @@
 """The stream of positions in the window: its dialog and its server."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -40,16 +40,6 @@ EVERYWHERE = "0.0.0.0"  # every network of the computer
 FIRST_PORT = 1024  # of those that take no administrator
 
 
-@dataclass(frozen=True)
-class StreamState:
-    """State of the stream."""
-
-    status: StreamStatus = field(default_factory=StreamStatus)
-    # Whether the place of a tip is streamed, and not the pose alone.
-    has_tip: bool = False
-    fault: str = ""  # why the enabled stream cannot listen
-
-
 class StreamDialog(FittedWindow, Translated, QDialog):
     """Shows and changes the address of the stream."""
 
@@ -59,7 +49,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.say(self, self.tr("Live stream"))
-        self._state = StreamState()
 
         # Widgets
         self._lead = self.say(
@@ -70,39 +59,29 @@ class StreamDialog(FittedWindow, Translated, QDialog):
             ),
         )
         self._on = self.say(QCheckBox(), self.tr("Stream pose and tip"))
-        self._address = self.say(
-            ChoiceField(),
-            self.tr("Address"),
-            tip=self.tr(
-                "{0} for this computer only, {1} for all networks, or an address of "
-                "this computer."
-            ).format(LOOPBACK, EVERYWHERE),
-        )
+        self._address = ChoiceField()
         self._address.setEditable(True)
         self._address.addItems([LOOPBACK, EVERYWHERE])
-        self._port = self.say(
-            NumberField("", (FIRST_PORT, LAST_PORT), 0), self.tr("Port")
-        )
-        self._address_label = self.say(
-            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Address")
-        )
-        self._address_label.setBuddy(self._address)
-        self._port_label = self.say(
-            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Port")
-        )
-        self._port_label.setBuddy(self._port)
+        self._port = NumberField("", (FIRST_PORT, LAST_PORT), 0)
+        whose = self.tr(
+            "{0} for this computer only, {1} for all networks, or an address of this "
+            "computer."
+        ).format(LOOPBACK, EVERYWHERE)
         self._reach = SignLabel()
-        self._state_label = SignLabel()
-        self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        self._state = SignLabel()
+        close = QDialogButtonBox.StandardButton.Close
+        self._buttons = QDialogButtonBox(close)
+        self.say(self._buttons.button(close), self.tr("Close"))
 
         # Layout
         layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
         form = QFormLayout()
         layout.addLayout(form)
         form.setHorizontalSpacing(2 * GRID)
-        form.addRow(self._address_label, self._address)
-        form.addRow(self._port_label, self._port)
-        fill(layout, self._reach, self._on, self._state_label, self._buttons)
+        address, port = self.tr("Address"), self.tr("Port")
+        form.addRow(self.make_label(self._address, address, tip=whose), self._address)
+        form.addRow(self.make_label(self._port, port), self._port)
+        fill(layout, self._reach, self._on, self._state, self._buttons)
         self.setMinimumWidth(72 * GRID)
 
         # Connections
@@ -111,7 +90,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._port.textEdited.connect(self._refresh)
         self._buttons.rejected.connect(self.reject)
 
-        self._retranslate()
+        self._refresh()
 
     def place(self) -> StreamPlace:
         """Return the address of the stream."""
@@ -126,10 +105,9 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._port.set_value(place.port)
         self._refresh()
 
-    def set_state(self, state: StreamState) -> None:
+    def set_state(self, state: StatusMessage) -> None:
         """Show the state of the stream."""
-        self._state = state
-        self._refresh()
+        self._state.set_value(state)
 
     def _refresh(self) -> None:
         is_on = self._on.isChecked()
@@ -147,20 +125,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
             )
             reach = StatusMessage.warning(text)
         self._reach.set_value(reach)
-        self._state_label.set_value(self._state_message() if is_on else StatusMessage())
-
-    def _state_message(self) -> StatusMessage:
-        state = self._state
-        if state.fault:
-            return StatusMessage.fault(state.fault)
-        if state.status.place is None:
-            return StatusMessage()
-        text = self.tr("Active at {0}. Clients: {1}").format(
-            state.status.place, state.status.n_clients
-        )
-        if not state.has_tip:
-            text += " " + self.tr("Only the pose is sent; there is no current tip.")
-        return StatusMessage.good(text)
 
     def _on_toggled(self, is_on: bool) -> None:
         self._refresh()
@@ -168,8 +132,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
 
     @override
     def _retranslate(self) -> None:
-        close = QDialogButtonBox.StandardButton.Close
-        self._buttons.button(close).setText(self.tr("Close"))
         self._refresh()
 
 
@@ -179,7 +141,7 @@ class Streaming(QObject):
     ``clock`` is the clock of the cameras.
     """
 
-    changed = Signal()  # `status`, `has_tip` or `fault` is different
+    changed = Signal()  # `has_tip`, `fault` or the status of `stream` is different
     _status_changed = Signal()
 
     def __init__(
@@ -192,8 +154,8 @@ class Streaming(QObject):
         self._opened: StreamPlace | None = None  # that is open, or was tried
         self._opening: Job | None = None
         self._reading = LatestJob(self)
-        self._has_tip = False
-        self._fault = ""
+        self.has_tip = False  # whether the place of a tip is streamed, too
+        self.fault = ""  # why the stream is unavailable
         # It takes every image, on the thread of the pipeline.
         self.stream = PoseStream(clock, lambda status: self._status_changed.emit())
 
@@ -204,16 +166,6 @@ class Streaming(QObject):
     def status(self) -> StreamStatus:
         """Address and number of clients."""
         return self.stream.status
-
-    @property
-    def has_tip(self) -> bool:
-        """Whether the place of a tip is streamed, and not the pose alone."""
-        return self._has_tip
-
-    @property
-    def fault(self) -> str:
-        """Why the stream is unavailable; empty if it runs or is off."""
-        return self._fault
 
     def want(self, place: StreamPlace | None) -> None:
         """Stream to an address; None stops the stream."""
@@ -261,7 +213,7 @@ class Streaming(QObject):
         job.start(failed=self._set_fault, ended=self._on_opening_ended)
 
     def _set_fault(self, fault: str) -> None:
-        self._fault = fault
+        self.fault = fault
         self.changed.emit()
 
     def _on_opening_ended(self) -> None:
@@ -272,7 +224,7 @@ class Streaming(QObject):
 
     def _on_tip_read(self, tip: StreamedTip | None) -> None:
         self.stream.set_tip(tip)
-        self._has_tip = tip is not None
+        self.has_tip = tip is not None
         self.changed.emit()
 
 
@@ -397,6 +349,17 @@ class StreamService(Service):
         elif streaming.fault != notices.text(streaming):
             notices.notify(streaming, streaming.fault)
         if self._dialog is not None:
-            state = StreamState(streaming.status, streaming.has_tip, streaming.fault)
-            self._dialog.set_state(state)
+            self._dialog.set_state(self._state())
         self.remark_changed.emit()
+
+    def _state(self) -> StatusMessage:
+        streaming, status = self.streaming, self.streaming.status
+        if streaming.fault:
+            return StatusMessage.fault(streaming.fault)
+        if status.place is None:
+            return StatusMessage()
+        text = self.tr("Active at {0}. Clients: {1}")
+        text = text.format(status.place, status.n_clients)
+        if not streaming.has_tip:
+            text += " " + self.tr("Only the pose is sent; there is no current tip.")
+        return StatusMessage.good(text)

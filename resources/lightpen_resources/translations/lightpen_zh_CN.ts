@@ -952,7 +952,23 @@
     </message>
 </context>
 <context>
-    <name>ExposureBar</name>
+    <name>ExposurePanel</name>
+    <message>
+        <source>E&amp;xposure</source>
+        <translation>曝光(&amp;X)</translation>
+    </message>
+    <message>
+        <source>Exposure</source>
+        <translation>曝光</translation>
+    </message>
+    <message>
+        <source>&amp;Gain</source>
+        <translation>增益(&amp;G)</translation>
+    </message>
+    <message>
+        <source>Gain</source>
+        <translation>增益</translation>
+    </message>
     <message>
         <source>No LED detected</source>
         <translation>未检测到 LED</translation>
@@ -982,47 +998,16 @@
         <translation>合适：{0} 个光点</translation>
     </message>
     <message>
-        <source>OK</source>
-        <translation>合适</translation>
+        <source>Up and Down keys change the value; Enter applies a typed number.</source>
+        <translation>用上下键调整；输入数值后按 Enter。</translation>
+    </message>
+    <message>
+        <source>{0:.0%} to {1:.0%} of full scale</source>
+        <translation>满量程的 {0:.0%} 至 {1:.0%}</translation>
     </message>
     <message>
         <source>LED {0}: {1} %</source>
         <translation>LED {0}：{1} %</translation>
-    </message>
-    <message>
-        <source>LED exposure</source>
-        <translation>LED 曝光</translation>
-    </message>
-    <message>
-        <source>dark</source>
-        <translation>过暗</translation>
-    </message>
-    <message>
-        <source>saturated</source>
-        <translation>饱和</translation>
-    </message>
-</context>
-<context>
-    <name>ExposurePanel</name>
-    <message>
-        <source>E&amp;xposure</source>
-        <translation>曝光(&amp;X)</translation>
-    </message>
-    <message>
-        <source>Exposure</source>
-        <translation>曝光</translation>
-    </message>
-    <message>
-        <source>&amp;Gain</source>
-        <translation>增益(&amp;G)</translation>
-    </message>
-    <message>
-        <source>Gain</source>
-        <translation>增益</translation>
-    </message>
-    <message>
-        <source>Up and Down keys change the value; Enter applies a typed number.</source>
-        <translation>用上下键调整；输入数值后按 Enter。</translation>
     </message>
     <message>
         <source>Auto exposure (LEDs)</source>
@@ -1423,6 +1408,34 @@
 <context>
     <name>InterruptedControl</name>
     <message>
+        <source>In use by another program</source>
+        <translation>另一程序正在使用</translation>
+    </message>
+    <message>
+        <source>Damaged: {0}</source>
+        <translation>已损坏：{0}</translation>
+    </message>
+    <message>
+        <source>Discard this swing? Its images remain on the disk.</source>
+        <translation>放弃这次摆动吗？图像保留在磁盘上。</translation>
+    </message>
+    <message>
+        <source>Resume</source>
+        <translation>继续</translation>
+    </message>
+    <message>
+        <source>Resume the swing of {0}</source>
+        <translation>继续 {0} 的摆动</translation>
+    </message>
+    <message>
+        <source>Discard</source>
+        <translation>放弃</translation>
+    </message>
+    <message>
+        <source>Discard the swing of {0}</source>
+        <translation>放弃 {0} 的摆动</translation>
+    </message>
+    <message>
         <source>Reading the swing</source>
         <translation>正在读取摆动</translation>
     </message>
@@ -1470,55 +1483,12 @@
         <translation>重新查找</translation>
     </message>
     <message>
-        <source>Interrupted: {0}</source>
-        <translation>中断的项目：{0}</translation>
-    </message>
-    <message>
-        <source>Interrupted swings: {0}</source>
-        <translation>中断的摆动：{0}</translation>
-    </message>
-    <message>
-        <source>Interrupted swing</source>
-        <translation>中断的摆动</translation>
-    </message>
-</context>
-<context>
-    <name>InterruptedRow</name>
-    <message>
-        <source>Discard this swing? Its images remain on the disk.</source>
-        <translation>放弃这次摆动吗？图像保留在磁盘上。</translation>
-    </message>
-    <message>
-        <source>Resume</source>
-        <translation>继续</translation>
-    </message>
-    <message>
-        <source>Resume the swing of {0}</source>
-        <translation>继续 {0} 的摆动</translation>
-    </message>
-    <message>
-        <source>Discard</source>
-        <translation>放弃</translation>
-    </message>
-    <message>
-        <source>Discard the swing of {0}</source>
-        <translation>放弃 {0} 的摆动</translation>
-    </message>
-    <message>
         <source>Keep</source>
         <translation>保留</translation>
     </message>
     <message>
-        <source>Keep the swing of {0}</source>
-        <translation>保留 {0} 的摆动</translation>
-    </message>
-    <message>
-        <source>Damaged: {0}</source>
-        <translation>已损坏：{0}</translation>
-    </message>
-    <message>
-        <source>In use by another program</source>
-        <translation>另一程序正在使用</translation>
+        <source>Interrupted: {0}</source>
+        <translation>中断的项目：{0}</translation>
     </message>
 </context>
 <context>
@@ -3436,10 +3406,6 @@ needed</source>
         <translation>复制 x、y、z（mm，以制表符分隔）</translation>
     </message>
     <message>
-        <source>Save results and plots, named by pen, tip and date</source>
-        <translation>以光笔、测头和日期命名，保存结果和图</translation>
-    </message>
-    <message>
         <source>Preview, save as PDF, or print</source>
         <translation>预览、另存为 PDF 或打印</translation>
     </message>
@@ -3460,20 +3426,20 @@ needed</source>
         <translation>其他格式</translation>
     </message>
     <message>
+        <source>Save results, named by pen, tip and date</source>
+        <translation>保存结果，按笔、测头和日期命名</translation>
+    </message>
+    <message>
+        <source>Record and tables</source>
+        <translation>记录和表格</translation>
+    </message>
+    <message>
         <source>Copy tip</source>
         <translation>复制测头坐标</translation>
     </message>
     <message>
         <source>Save...</source>
         <translation>保存...</translation>
-    </message>
-    <message>
-        <source>Record, tables and plots</source>
-        <translation>记录、表格和图</translation>
-    </message>
-    <message>
-        <source>All plots (PNG)</source>
-        <translation>全部图 (PNG)</translation>
     </message>
 </context>
 <context>
@@ -4255,14 +4221,6 @@ needed</source>
         <translation>该网络中的每台计算机无需登录即可接收数据。防火墙可能会要求许可。</translation>
     </message>
     <message>
-        <source>Active at {0}. Clients: {1}</source>
-        <translation>已开启：{0}。客户端：{1}</translation>
-    </message>
-    <message>
-        <source>Only the pose is sent; there is no current tip.</source>
-        <translation>只发送位姿；没有当前测头。</translation>
-    </message>
-    <message>
         <source>Sends pose and tip live by OpenIGTLink to other programs such as 3D Slicer.</source>
         <translation>通过 OpenIGTLink 向其他程序（例如 3D Slicer）实时发送位姿和测头位置。</translation>
     </message>
@@ -4296,6 +4254,14 @@ needed</source>
     <message>
         <source>({0} of them miss images)</source>
         <translation>（其中 {0} 个丢失图像）</translation>
+    </message>
+    <message>
+        <source>Active at {0}. Clients: {1}</source>
+        <translation>已开启：{0}。客户端：{1}</translation>
+    </message>
+    <message>
+        <source>Only the pose is sent; there is no current tip.</source>
+        <translation>只发送位姿；没有当前测头。</translation>
     </message>
 </context>
 <context>
@@ -4616,14 +4582,6 @@ needed</source>
         <translation>在计算机上打开“摆动”步骤后，摆动即开始。</translation>
     </message>
     <message>
-        <source>More images needed: U (k = 2) has increased</source>
-        <translation>U (k = 2) 增大，需要更多图像</translation>
-    </message>
-    <message>
-        <source>More images needed to complete the postures</source>
-        <translation>需要更多图像以完成各姿态</translation>
-    </message>
-    <message>
         <source>The camera sends no images. No data is lost. Press Space to continue when images are received.</source>
         <translation>相机没有发送图像。没有数据丢失。收到图像后按空格键继续。</translation>
     </message>
@@ -4849,14 +4807,6 @@ needed</source>
     <message>
         <source>Close verification</source>
         <translation>结束验证</translation>
-    </message>
-    <message>
-        <source>Keep</source>
-        <translation>保留</translation>
-    </message>
-    <message>
-        <source>Keep the verification of {0}</source>
-        <translation>保留 {0} 的验证</translation>
     </message>
     <message>
         <source>Damaged: {0}</source>

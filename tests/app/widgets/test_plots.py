@@ -103,12 +103,6 @@ def test_a_change_of_theme_colours_plots_that_are_there(
     assert DARK.panel not in light
 
 
-def test_the_picture_is_saved_at_twice_its_size(trace: TracePlot) -> None:
-    saved = QImage.fromData(trace.png())
-    assert (saved.width(), saved.height()) == (720, 480)
-    assert DARK.accent in colors_in(saved.copy(0, 100, 720, 300))
-
-
 def test_arrows_point_along_the_residuals_with_v_downwards(qtbot: QtBot) -> None:
     plot = ArrowPlot(Axes("Residuals"))
     show(qtbot, plot)
@@ -334,7 +328,7 @@ def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
 
 
 def test_one_plot_is_enlarged_over_its_neighbours(qtbot: QtBot) -> None:
-    cards = [PlotCard(PosturePlot(Axes(name)), name) for name in "abc"]
+    cards = [PlotCard(PosturePlot(Axes(name))) for name in "abc"]
     grid = PlotGrid(cards)
     qtbot.addWidget(grid)
     grid.resize(600, 400)

@@ -3,14 +3,11 @@
 import math
 from collections import deque
 
-from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QWidget
-from typing_extensions import override
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QFrame, QLabel
 
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
 from lightpen.detection.inspection import (
-    DARK_PEAK,
     Advice,
     AutoExposure,
     Exposure,
@@ -19,12 +16,11 @@ from lightpen.detection.inspection import (
     advise,
     is_sharp,
 )
-from lightpen.detection.spots import SATURATED_LEVEL
 from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.languages import listed
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
-from lightpen_app.look.signs import Sign, draw_sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, text_label
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.camera.settings_panel import SettingField
 from lightpen_app.widgets.controls import PushButton
@@ -32,129 +28,7 @@ from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.live_view import LiveView
 
-BAR_HEIGHT = 2 * GRID
 MOST_NAMED = 6  # LEDs in one line
-
-
-class ExposureBar(Translated, QWidget):
-    """A scale with one tick per LED, and the verdict as text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.say(self, self.tr("LED exposure"))
-        self._value = Exposure()
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._retranslate()
-
-    def value(self) -> Exposure:
-        """Return the value."""
-        return self._value
-
-    def set_value(self, value: Exposure) -> None:
-        """Show another image's LEDs."""
-        self._value = value
-        self._retranslate()
-
-    def verdict(self) -> str:
-        """Return the text of the bar."""
-        value = self._value
-        if not value.peaks:
-            return self.tr("No LED detected")
-        of_leds = value.are_leds
-        if value.n_saturated:
-            n_meant, meant = value.n_saturated, value.saturated_leds
-            words = (
-                self.tr("Saturated: {0} of {1} LEDs")
-                if of_leds
-                else self.tr("Saturated: {0} of {1} spots")
-            )
-        elif value.n_dark:
-            n_meant, meant = value.n_dark, value.dark_leds
-            words = (
-                self.tr("Too dark: {0} of {1} LEDs")
-                if of_leds
-                else self.tr("Too dark: {0} of {1} spots")
-            )
-        else:
-            n_meant, meant = value.n_good, ()
-            words = self.tr("OK: {0} LEDs") if of_leds else self.tr("OK: {0} spots")
-        text = words.format(n_meant, len(value.peaks))
-        if not meant or len(meant) == len(value.peaks):
-            return text
-        named = listed(map(str, meant[:MOST_NAMED]))
-        more = "\u2026" if len(meant) > MOST_NAMED else ""
-        return f"{text}: {named}{more}"
-
-    def levels(self) -> str:
-        """Return the level of each LED, as text."""
-        value = self._value
-        return "\n".join(
-            self.tr("LED {0}: {1} %").format(led, f"{100 * peak:.0f}")
-            for led, peak in zip(value.leds, value.peaks, strict=False)
-        )
-
-    @override
-    def sizeHint(self) -> QSize:
-        return QSize(320, 9 * GRID)
-
-    @override
-    def minimumSizeHint(self) -> QSize:
-        return QSize(160, 9 * GRID)
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        value = self._value
-        colors = colors_of(self.palette())
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        sign, tone = self._mark()
-        head = QRectF(0, 0, self.width(), 3 * GRID)
-        draw_sign(painter, QRectF(0, 4, 2 * GRID, 2 * GRID), sign, colors.tone(tone))
-        painter.setPen(colors.tone(tone))
-        painter.setFont(font(TextSize.BODY, bold=True))
-        words = head.adjusted(3 * GRID, 0, 0, 0)
-        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, self.verdict())
-
-        bar = QRectF(1, 4 * GRID, self.width() - 2, BAR_HEIGHT)
-        painter.setPen(QPen(QColor(colors.line), 1))
-        painter.setBrush(QColor(colors.raised))
-        painter.drawRect(bar)
-        good = bar.adjusted(
-            bar.width() * DARK_PEAK, 0, -bar.width() * (1 - SATURATED_LEVEL), 0
-        )
-        painter.setBrush(QColor(colors.partial))
-        painter.drawRect(good)
-        painter.setPen(QPen(QColor(colors.text), 2))
-        for peak in value.peaks:
-            x = bar.left() + bar.width() * min(max(peak, 0.0), 1.0)
-            painter.drawLine(QPointF(x, bar.top() - 3), QPointF(x, bar.bottom() + 3))
-        self._draw_scale(painter, bar, QColor(colors.muted))
-
-    @override
-    def _retranslate(self) -> None:
-        self.update()
-        self.setAccessibleDescription(self.verdict())
-        set_tooltip(self, self.levels())
-
-    def _draw_scale(self, painter: QPainter, bar: QRectF, color: QColor) -> None:
-        painter.setPen(color)
-        painter.setFont(font(TextSize.SMALL))
-        top = bar.bottom() + 4
-        height = self.height() - top
-        whole = QRectF(bar.left(), top, bar.width(), height)
-        good_left = whole.adjusted(bar.width() * DARK_PEAK, 0, 0, 0)
-        left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
-        painter.drawText(whole, left, self.tr("dark"))
-        painter.drawText(good_left, left, self.tr("OK"))
-        painter.drawText(whole, right, self.tr("saturated"))
-
-    def _mark(self) -> tuple[Sign, Tone]:
-        value = self._value
-        if not value.peaks:
-            return Sign.EYE, Tone.QUIET
-        if value.n_saturated or value.n_dark:
-            return Sign.WARNING, Tone.WARN
-        return Sign.CHECK, Tone.GOOD
 
 
 US_PER_MS = 1000.0
@@ -178,7 +52,9 @@ class ExposurePanel(Translated, QFrame):
         self._adjustment: AutoExposure | None = None
 
         # Widgets
-        self._bar = ExposureBar()
+        self._value = Exposure()
+        self._verdict = SignLabel()
+        self._levels = text_label(TextSize.LEAD)
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
         self._exposure_name = self.say(QLabel(), self.tr("E&xposure"))
         self._exposure = self.say(
@@ -195,7 +71,7 @@ class ExposurePanel(Translated, QFrame):
         self._why_fixed.setMinimumHeight(5 * GRID)  # as the fields in its place
 
         # Layout
-        layout = vertical_layout(self, self._bar, margins=PADDING)
+        layout = vertical_layout(self, self._verdict, self._levels, margins=PADDING)
         horizontal_layout(
             layout,
             self._exposure_name,
@@ -216,8 +92,33 @@ class ExposurePanel(Translated, QFrame):
 
     def set_value(self, value: Exposure) -> None:
         """Show the LEDs of another image."""
-        self._bar.set_value(value)
+        self._value = value
         self._refresh()
+
+    def verdict(self) -> StatusMessage:
+        """Return whether all LEDs are well exposed."""
+        value = self._value
+        if not value.peaks:
+            return StatusMessage(self.tr("No LED detected"), Sign.EYE, Tone.QUIET)
+        n_leds, of_leds = len(value.peaks), value.are_leds
+        if value.n_saturated:
+            words = (
+                self.tr("Saturated: {0} of {1} LEDs")
+                if of_leds
+                else self.tr("Saturated: {0} of {1} spots")
+            )
+            text = words.format(value.n_saturated, n_leds)
+            return StatusMessage.warning(text + _named(value.saturated_leds, n_leds))
+        if value.n_dark:
+            words = (
+                self.tr("Too dark: {0} of {1} LEDs")
+                if of_leds
+                else self.tr("Too dark: {0} of {1} spots")
+            )
+            text = words.format(value.n_dark, n_leds)
+            return StatusMessage.warning(text + _named(value.dark_leds, n_leds))
+        words = self.tr("OK: {0} LEDs") if of_leds else self.tr("OK: {0} spots")
+        return StatusMessage.good(words.format(value.n_good))
 
     def set_camera(
         self, caps: CameraCapabilities | None, settings: CameraSettings
@@ -268,7 +169,23 @@ class ExposurePanel(Translated, QFrame):
             )
         self._refresh()
 
+    def _show_levels(self) -> None:
+        value = self._value
+        self._verdict.set_value(self.verdict())
+        words = ""
+        if value.peaks:
+            words = self.tr("{0:.0%} to {1:.0%} of full scale").format(
+                min(value.peaks), max(value.peaks)
+            )
+        self._levels.setText(words)
+        levels = (
+            self.tr("LED {0}: {1} %").format(led, f"{100 * peak:.0f}")
+            for led, peak in zip(value.leds, value.peaks, strict=False)
+        )
+        set_tooltip(self._levels, "\n".join(levels))
+
     def _refresh(self) -> None:
+        self._show_levels()
         self._adjust.setText(
             self.tr("Stop") if self._is_adjusting else self.tr("Auto exposure (LEDs)")
         )
@@ -287,10 +204,10 @@ class ExposurePanel(Translated, QFrame):
             self.tr("Recorded images: exposure and gain are fixed.")
         )
         adjustment = self._adjustment
-        if adjustment is not None and _holds(adjustment, self._bar.value()):
+        if adjustment is not None and _holds(adjustment, self._value):
             self._advice.setText(self._outcome_words(adjustment))
             return
-        advice = advise(self._bar.value(), self._settings, self._capabilities)
+        advice = advise(self._value, self._settings, self._capabilities)
         self._advice.setText(self._words(advice, self._capabilities))
 
     def _outcome_words(self, adjustment: AutoExposure) -> str:
@@ -349,6 +266,14 @@ class ExposurePanel(Translated, QFrame):
                 return self.tr("Close the aperture slightly.")
             case Advice.OPEN_APERTURE:
                 return self.tr("Open the aperture slightly.")
+
+
+def _named(leds: tuple[int, ...], n_leds: int) -> str:
+    """Return the numbers of the LEDs that are meant, unless all are."""
+    if not leds or len(leds) == n_leds:
+        return ""
+    more = "\u2026" if len(leds) > MOST_NAMED else ""
+    return f": {listed(map(str, leds[:MOST_NAMED]))}{more}"
 
 
 def _holds(adjustment: AutoExposure, exposure: Exposure) -> bool:

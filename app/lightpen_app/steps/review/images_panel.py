@@ -1,6 +1,6 @@
 """The images of a solved swing: list, image and residuals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -83,7 +83,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._switch = CameraSwitch()
         self._switch.hide()
         self._misfits = MisfitPlot(Axes(""))
-        self._card = PlotCard(self._misfits, "misfit-of-images")
+        self._card = PlotCard(self._misfits)
 
         # Layout
         self._grid = layout = grid_layout(self, margins=(0, GRID, 0, 0))
@@ -119,10 +119,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         grid.setColumnStretch(2, 0 if is_narrow else 1)
         grid.setRowStretch(0, VIEW_SHARE)
         grid.setRowStretch(3, PLOT_SHARE if is_narrow else 0)
-
-    def cards(self) -> Sequence[PlotCard]:
-        """Return the plot with its menu."""
-        return (self._card,)
 
     def value(self) -> Solution | None:
         """Return the displayed solution."""

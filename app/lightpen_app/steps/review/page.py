@@ -55,8 +55,7 @@ class ReviewPage(Page):
         self._shown = SwingStatus()
 
         # Widgets
-        place = workbench.save_place
-        self._view = view = ReviewView(self._run, place, services)
+        self._view = view = ReviewView(self._run, services)
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
@@ -66,7 +65,7 @@ class ReviewPage(Page):
             *(self._run, view, workbench.library, workbench.notifications),
             *(workbench.folder, workbench.around.now),
         )
-        self._along = ResultExport(self._run, place, view.tabs.pictures, services, self)
+        self._along = ResultExport(self._run, workbench.save_place, services, self)
 
         # Layout
         vertical_layout(self, view)

@@ -1,7 +1,6 @@
 """Framed plots side by side, each of which can be enlarged."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QMouseEvent
@@ -17,26 +16,15 @@ N_COLUMNS = 2  # of a grid
 LEAST_HEIGHT = 25 * GRID  # px, of a plot with its title and axes
 
 
-class NamedPicture(NamedTuple):
-    """A plot as PNG, with the end of its file name."""
-
-    name: str
-    data: bytes
-
-
 class PlotCard(Translated, QFrame):
-    """A framed plot that its button, or a double click, enlarges.
-
-    ``file_stem`` is the end of the name of its picture.
-    """
+    """A framed plot that its button, or a double click, enlarges."""
 
     # Enlarge the plot over its neighbours, or reduce it again.
     enlarge_toggled = Signal(bool)
 
-    def __init__(self, plot: Figure, file_stem: str) -> None:
+    def __init__(self, plot: Figure) -> None:
         super().__init__()
         self.plot = plot
-        self._file_stem = file_stem
         self.setProperty("area", "panel")
 
         self._is_needed = True
@@ -69,10 +57,6 @@ class PlotCard(Translated, QFrame):
         if needed is not self._is_needed:
             self._is_needed = needed
             self.setVisible(needed)
-
-    def picture(self, mark: str) -> NamedPicture:
-        """Return the plot with a mark for saving beside others."""
-        return NamedPicture(f"{self._file_stem}.png", self.plot.png(mark))
 
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

@@ -84,11 +84,7 @@ class ResidualsPanel(PlotsPanel):
         axes = Axes(self.tr("Residuals by LED / px"), self.tr("LED"))
         self._leds = BarPlot(axes, series, "led")
         super().__init__(
-            [
-                PlotCard(self._arrows, "residuals-over-image"),
-                PlotCard(self._leds, "residuals-of-leds"),
-                PlotCard(self._lens, "lens-field"),
-            ]
+            [PlotCard(self._arrows), PlotCard(self._leds), PlotCard(self._lens)]
         )
         self._lens_card = self.cards()[-1]
         self._lens_card.set_needed(False)
@@ -194,12 +190,7 @@ class UncertaintyPanel(PlotsPanel):
             self.tr("away from the camera"),
         )
         self._postures = PosturePlot(axes)
-        super().__init__(
-            [
-                PlotCard(self._budget, "uncertainty-budget"),
-                PlotCard(self._postures, "postures"),
-            ]
-        )
+        super().__init__([PlotCard(self._budget), PlotCard(self._postures)])
         self._remark = text_label(TextSize.SMALL, Tone.QUIET)
         rows = (each.budget_row() for each in services)
         self._checks = [row for row in rows if row is not None]

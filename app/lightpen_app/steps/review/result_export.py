@@ -1,11 +1,11 @@
 """Opens the folder of a result, copies the tip, exports and prints the result."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import astuple, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -40,10 +40,6 @@ from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.swing_run import SwingRun
-
-if TYPE_CHECKING:
-    from lightpen_app.steps.review.plot_cards import NamedPicture
-
 
 LONGEST = 200  # characters
 N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
@@ -118,16 +114,7 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
         self.accept()
 
 
-@dataclass(frozen=True)
-class Export:
-    """Format to save."""
-
-    formats: tuple[ExportFormat, ...]
-    has_plots: bool = False
-
-
 TABLES = TABLE_FORMATS[:3]  # without the text that is pasted
-ALL, PLOTS = Export(TABLES, has_plots=True), Export((), has_plots=True)
 
 
 class ResultTools(Translated, QWidget):
@@ -135,13 +122,13 @@ class ResultTools(Translated, QWidget):
 
     folder_requested = Signal()  # open the folder of the swing
     copy_requested = Signal()  # copy the tip to the clipboard
-    save_requested = Signal(object)  # Export
+    save_requested = Signal(object)  # tuple[ExportFormat, ...]
     report_requested = Signal()  # show the printed report
     press_requested = Signal()  # start the press test
 
     def __init__(self, formats: Sequence[ExportFormat] = ()) -> None:
         super().__init__()
-        single = [Export((each,)) for each in (*TABLE_FORMATS, *formats)]
+        single = [(each,) for each in (*TABLE_FORMATS, *formats)]
 
         # Widgets
         self._copy = self.make_button(self.tr("Copy tip"), self.copy_requested)
@@ -150,14 +137,14 @@ class ResultTools(Translated, QWidget):
         menu = QMenu(self._save)
         menu.setToolTipsVisible(True)
         self._report = self.say(menu.addAction(""), self.tr("Calibration report..."))
-        usual = [each for each in single if each.formats[0].name == "csv"]
+        usual = [each for each in single if each[0].name == "csv"]
         others = [each for each in single if each not in usual]
-        self._actions = [(export, menu.addAction("")) for export in (*usual, ALL)]
+        self._actions: list[tuple[tuple[ExportFormat, ...], QAction]] = [
+            (export, menu.addAction("")) for export in (*usual, TABLES)
+        ]
         self._others = self.say(menu.addMenu(""), self.tr("Other formats"))
         self._others.setToolTipsVisible(True)
-        self._actions += [
-            (export, self._others.addAction("")) for export in (*others, PLOTS)
-        ]
+        self._actions += [(export, self._others.addAction("")) for export in others]
         menu.addSeparator()
         self._folder = self.say(
             menu.addAction(""),
@@ -184,7 +171,7 @@ class ResultTools(Translated, QWidget):
         """Disable all with a reason, or enable them."""
         words = self.tr("Copy x, y, z in mm, separated by tabs")
         self._copy.set_why_not(why_not, words)
-        words = self.tr("Save results and plots, named by pen, tip and date")
+        words = self.tr("Save results, named by pen, tip and date")
         self._save.set_why_not(why_not, words)
 
     def set_has_report(self, has_report: bool) -> None:
@@ -207,41 +194,27 @@ class ResultTools(Translated, QWidget):
     def _retranslate(self) -> None:
         for export, action in self._actions:
             action.setText(self._name(export) + "...")
-            described = (worded(each.description) for each in export.formats)
+            described = (worded(each.description) for each in export)
             set_tooltip(action, listed(described))
 
-    def _name(self, export: Export) -> str:
-        if export == ALL:
-            return self.tr("Record, tables and plots")
-        if export == PLOTS:
-            return self.tr("All plots (PNG)")
-        return worded(export.formats[0].label)
-
-
-DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
+    def _name(self, export: tuple[ExportFormat, ...]) -> str:
+        if export == TABLES:
+            return self.tr("Record and tables")
+        return worded(export[0].label)
 
 
 class ResultExport(QObject):
-    """Carries out requests of the result tools.
-
-    ``draw_plots`` returns all plots as pictures; only the page can draw them.
-    """
+    """Carries out requests of the result tools."""
 
     message_sent = Signal(str)  # what was done
     failed = Signal(str)  # the sentence why something was not
 
     def __init__(
-        self,
-        run: SwingRun,
-        place: SavePlace,
-        draw_plots: DrawPlots,
-        services: Services,
-        page: QWidget,
+        self, run: SwingRun, place: SavePlace, services: Services, page: QWidget
     ) -> None:
         super().__init__(page)
         self._run = run
         self._place = place
-        self._draw_plots = draw_plots
         self._page = page
         self._saving: Job | None = None
         self._print_report = report_printer(services, place, page)
@@ -277,9 +250,9 @@ class ResultExport(QObject):
             QApplication.clipboard().setText(line)
             self.message_sent.emit(self.tr("Tip copied: x, y, z in mm."))
 
-    def _ask_laboratory(self, export: Export) -> None:
+    def _ask_laboratory(self, export: tuple[ExportFormat, ...]) -> None:
         """Ask for the laboratory where a format names it, then for the folder."""
-        if not any(each.needs_laboratory for each in export.formats):
+        if not any(each.needs_laboratory for each in export):
             self._ask_folder(export, None)
             return
         dialog = LaboratoryDialog(self._place.settings.laboratory(), self._page)
@@ -288,7 +261,9 @@ class ResultExport(QObject):
         dialog.given.connect(lambda laboratory: self._ask_folder(export, laboratory))
         dialog.open()
 
-    def _ask_folder(self, export: Export, laboratory: Laboratory | None) -> None:
+    def _ask_folder(
+        self, export: tuple[ExportFormat, ...], laboratory: Laboratory | None
+    ) -> None:
         dialog = QFileDialog(self._page, self.tr("Folder for saving"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
@@ -300,7 +275,10 @@ class ResultExport(QObject):
         dialog.open()
 
     def _save(
-        self, export: Export, laboratory: Laboratory | None, folder: Path
+        self,
+        export: tuple[ExportFormat, ...],
+        laboratory: Laboratory | None,
+        folder: Path,
     ) -> None:
         """Save an export; accepted results from their file."""
         status, stem, archive = self._run.status, self._place.stem(), self._run.archive
@@ -308,13 +286,8 @@ class ResultExport(QObject):
         if solution is None:
             return
         self._place.remember(folder)
-        pictures = self._draw_plots() if export.has_plots else ()
 
         def write(_: Report) -> None:
-            for picture in pictures:
-                save_new(folder, f"{stem}_{picture.name}", picture.data)
-            if not export.formats:
-                return
             found = (
                 exported_solution(solution, names)
                 if result is None
@@ -322,7 +295,7 @@ class ResultExport(QObject):
                     with_status(read_calibration(archive.file_of(result)), local_now())
                 )
             )
-            for each in export.formats:
+            for each in export:
                 save_new(folder, stem + each.suffix, each.content(found, laboratory))
 
         self._saving = job = Job(write, self)

@@ -1,7 +1,6 @@
 """View of the step Review: the verdict, the result and its details."""
 
 from functools import partial
-from itertools import chain
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
@@ -38,12 +37,10 @@ from lightpen_app.widgets.fitting import (
     ShrinkingScrollContent,
 )
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
-    from lightpen_app.steps.review.plot_cards import NamedPicture
     from lightpen_app.steps.review.plots_panel import PlotsPanel
 
 
@@ -55,10 +52,9 @@ class DetailTabs(QTabWidget):
     # MethodsPanel: the tab of the methods is seen for the first time
     methods_made = Signal(object)
 
-    def __init__(self, run: SwingRun, place: SavePlace, services: Services) -> None:
+    def __init__(self, run: SwingRun, services: Services) -> None:
         super().__init__()
         self._run = run
-        self._place = place
         self._images = LazyWidget(_make_images_panel)
         self._residuals = LazyWidget(_make_residuals_panel)
         self._methods: LazyWidget[PlotsPanel] = LazyWidget(_make_methods_panel)
@@ -99,16 +95,6 @@ class DetailTabs(QTabWidget):
         for panel, tab in self._tab_of.items():
             if tab is self.currentWidget():
                 self._show_solution(panel.content())
-
-    def pictures(self) -> "list[NamedPicture]":
-        """Return all plots for saving, also of hidden tabs."""
-        for panel, tab in self._tab_of.items():
-            self._show_solution(panel.content())
-            tab.resize(self.currentWidget().size())
-            tab.grab()  # lays it out as if it was looked at
-        cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
-        mark = self._place.mark()
-        return [card.picture(mark) for card in cards if card.is_needed]
 
     def shut_down(self) -> None:
         """Cancel running jobs."""
@@ -163,9 +149,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     # px; then tip and buttons are in the first tab, too
     narrow_below, low_below = 112 * GRID, 60 * GRID
 
-    def __init__(
-        self, run: SwingRun, place: SavePlace, services: Services = ()
-    ) -> None:
+    def __init__(self, run: SwingRun, services: Services = ()) -> None:
         super().__init__()
         self._can_verify = bool(verify_step(services))
 
@@ -195,7 +179,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             ),
         )
         self.tools = ResultTools(export_formats(services))
-        self.tabs = self.say(DetailTabs(run, place, services), self.tr("Details"))
+        self.tabs = self.say(DetailTabs(run, services), self.tr("Details"))
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
         # Layout

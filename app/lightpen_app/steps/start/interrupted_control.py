@@ -12,22 +12,28 @@ from lightpen.messages import printable
 from lightpen.record.results.acceptance import conclude_accepted
 from lightpen.record.results.result_folder import swing_folder
 from lightpen.record.swings.interrupted import (
+    DamagedSwing,
     InterruptedSwings,
     discard_damaged,
     discard_swing,
     find_unfinished,
 )
-from lightpen.record.swings.reading import recorded_names, recorded_origin
+from lightpen.record.swings.reading import Record, recorded_names, recorded_origin
 from lightpen.swing.swing_recorder import Resumable, read_resumable
-from lightpen_app.face import InterruptedWork, Service
+from lightpen_app.face import InterruptedWork, RowWords, Service
 from lightpen_app.look.languages import listed, worded
-from lightpen_app.look.phrases import missing_input_text, origin_text
-from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.look.phrases import missing_input_text, n_images_text, origin_text
+from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
+from lightpen_app.steps.start.interrupted_panel import (
+    InterruptedEntry,
+    InterruptedPanel,
+)
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 NOTICE = "start"  # cause of its notifications
+LONGEST = 16  # characters of a name
 
 
 class InterruptedControl(QObject):
@@ -62,11 +68,7 @@ class InterruptedControl(QObject):
 
         # Connections
         self._searching.timeout.connect(self._search_now)
-        panel.resume_requested.connect(self._on_resume_requested)
-        panel.discard_requested.connect(self._on_discard_requested)
         panel.search_requested.connect(self._search_now)
-        panel.continue_requested.connect(self._on_continue_requested)
-        panel.close_requested.connect(self._on_close_requested)
         workbench.run.open_requested.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.refused.connect(self._on_run_refused)
@@ -97,16 +99,70 @@ class InterruptedControl(QObject):
         self._search.start(search, self._on_found, self._show_fault)
 
     def _on_found(self, found: "Interrupted") -> None:
-        swings = found.swings
-        present = self._run.status.record_folder
-        others = InterruptedSwings(
-            tuple(r for r in swings.interrupted if r.folder != present),
-            tuple(r for r in swings.under_way if r.folder != present),
-            swings.damaged,
-        )
+        swings, present = found.swings, self._run.status.record_folder
         if self._work is None and not self._is_continuing:
             self._panel.set_waiting("")
-        self._panel.set_value(others, found.works)
+        offered = (each for each in swings.interrupted if each.folder != present)
+        others = (each for each in swings.under_way if each.folder != present)
+        entries = (
+            *map(self._work_entry, found.works),
+            *map(self._swing_entry, offered),
+            *map(self._other_entry, others),
+            *map(self._damaged_entry, swings.damaged),
+        )
+        self._panel.set_entries(entries)
+
+    def _work_entry(self, work: InterruptedWork) -> InterruptedEntry:
+        def close() -> None:
+            self._on_close_requested(work)
+
+        def resume() -> None:
+            self._on_continue_requested(work)
+
+        if work.names is None:
+            return InterruptedEntry(work.words, None, close, is_damaged=True)
+        return InterruptedEntry(work.words, resume, close)
+
+    def _swing_entry(self, record: Record) -> InterruptedEntry:
+        names, folder = recorded_names(record), record.folder
+
+        def words() -> RowWords:
+            called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
+            parts = (*called, n_images_text(len(record.images)))
+            text = PARTED.join(filter(None, parts))
+            return self._row_words(moment_text(record.header.created), text)
+
+        return InterruptedEntry(
+            words,
+            lambda: self._on_resume_requested(folder),
+            lambda: self._on_discard_requested(folder, discard_swing),
+        )
+
+    def _other_entry(self, record: Record) -> InterruptedEntry:
+        def words() -> RowWords:
+            heading = moment_text(record.header.created)
+            return self._row_words(heading, self.tr("In use by another program"))
+
+        return InterruptedEntry(words, None, None)
+
+    def _damaged_entry(self, swing: DamagedSwing) -> InterruptedEntry:
+        def words() -> RowWords:
+            heading = self.tr("Damaged: {0}").format(shortened(swing.folder.name))
+            return self._row_words(heading, breakable(worded(swing.message)))
+
+        def discard() -> None:
+            self._on_discard_requested(swing.folder, discard_damaged)
+
+        return InterruptedEntry(words, None, discard, is_damaged=True)
+
+    def _row_words(self, heading: str, description: str) -> RowWords:
+        return RowWords(
+            heading,
+            description,
+            self.tr("Discard this swing? Its images remain on the disk."),
+            (self.tr("Resume"), self.tr("Resume the swing of {0}")),
+            (self.tr("Discard"), self.tr("Discard the swing of {0}")),
+        )
 
     def _work_on(
         self,
@@ -241,10 +297,9 @@ class InterruptedControl(QObject):
     def _on_run_refused(self) -> None:
         self._resumed = self._reviewed = None
 
-    def _on_discard_requested(self, folder: Path) -> None:
-        damaged = {swing.folder for swing in self._panel.value().damaged}
-        discard = discard_damaged if folder in damaged else discard_swing
-
+    def _on_discard_requested(
+        self, folder: Path, discard: Callable[[Path], None]
+    ) -> None:
         def leave(_: Report) -> Path:
             discard(folder)
             return folder

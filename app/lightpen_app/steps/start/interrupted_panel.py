@@ -3,82 +3,60 @@
 One that another program captures, or that is damaged, is reported and not offered.
 """
 
-from enum import StrEnum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGroupBox, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QGroupBox, QWidget
 from typing_extensions import override
 
-from lightpen.record.swings.interrupted import DamagedSwing, InterruptedSwings
-from lightpen.record.swings.reading import Record, recorded_names
-from lightpen_app.face import InterruptedWork, RowWords
-from lightpen_app.look.languages import worded
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.phrases import n_images_text
+from lightpen_app.face import RowWords
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.look.words import PARTED, breakable, moment_text, shortened, unbroken
-from lightpen_app.widgets.controls import PushButton, give_focus
+from lightpen_app.look.words import unbroken
+from lightpen_app.widgets.bars import Question, QuestionBar
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import PageScroll
 
-ROW_HEIGHT, SENTENCE_HEIGHT = 7 * GRID, 17 * GRID
+N_ROWS_SEEN = 2  # the others are scrolled to
+NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
-class RowKind(StrEnum):
-    """Possible actions for interrupted work."""
+@dataclass(frozen=True, eq=False)
+class InterruptedEntry:
+    """Interrupted work, and what can be done with it; None where it cannot."""
 
-    OFFERED = "offered"  # to continue with
-    UNDER_WAY = "under way"  # in another program
-    DAMAGED = "damaged"
+    words: Callable[[], RowWords]
+    resume: Callable[[], object] | None
+    discard: Callable[[], object] | None
+    is_damaged: bool = False
 
 
-class InterruptedItem(Translated, QFrame):
-    """Interrupted work; subclasses provide the texts."""
+class InterruptedRow(Translated, QFrame):
+    """Interrupted work with its buttons."""
 
-    # The buttons; discarding was confirmed.
-    resume_requested = Signal()
     discard_requested = Signal()
 
-    def __init__(self, kind: RowKind) -> None:
+    def __init__(self, entry: InterruptedEntry) -> None:
         super().__init__()
-        self._kind = kind
-        self._had_focus: PushButton | None = None
+        self._entry = entry
 
         # Widgets
         self._when = text_label(TextSize.BODY)
         self._what = text_label(TextSize.SMALL, Tone.QUIET)
-        self._resume = PushButton()
-        self._discard = PushButton()
-        self._offer = _button_row(self._resume, self._discard)
-        self._confirm = PushButton()
-        self._keep = PushButton()
-        # Keep is where Discard was, so that a double click discards nothing.
-        self._question = _button_row(self._confirm, self._keep)
+        self._resume = self.make_button("", entry.resume or bool)
+        self._discard = self.make_button("", self.discard_requested)
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
-        line = horizontal_layout(layout, spacing=2 * GRID)
-        words = vertical_layout(line, 1, self._when, spacing=0, stretch=1)
-        if kind is not RowKind.DAMAGED:
-            fill(words, self._what)
-        fill(words, 1)
-        fill(line, self._offer, self._question)
-        if kind is RowKind.DAMAGED:
-            fill(layout, (self._what, 1, Qt.AlignmentFlag.AlignTop))
+        horizontal_layout(layout, (self._when, 1), self._resume, self._discard)
+        layout.addWidget(self._what, 1, Qt.AlignmentFlag.AlignTop)
 
-        # Connections
-        self._resume.clicked.connect(self.resume_requested)
-        self._discard.clicked.connect(self._on_discard_clicked)
-        self._keep.clicked.connect(self._on_keep_clicked)
-        self._confirm.clicked.connect(self.discard_requested)
-
-        self._question.hide()
-        self._offer.setVisible(kind is not RowKind.UNDER_WAY)
-        self._resume.setVisible(kind is not RowKind.DAMAGED)
-        if kind is RowKind.DAMAGED:
+        self._resume.setVisible(entry.resume is not None)
+        self._discard.setVisible(entry.discard is not None)
+        if entry.is_damaged:
             set_tone(self._when, Tone.BAD)
-        self.setMinimumHeight(ROW_HEIGHT)
         self._retranslate()
 
     def words(self) -> tuple[str, str]:
@@ -87,135 +65,35 @@ class InterruptedItem(Translated, QFrame):
 
     def height_for(self, width: int) -> int:
         """Return the height of the row that shows its text completely, px."""
-        least = SENTENCE_HEIGHT if self._kind is RowKind.DAMAGED else ROW_HEIGHT
         for each in self.findChildren(QWidget):
             each.ensurePolished()  # its font is known only then
-        return max(least, self.heightForWidth(width))
+        return self.heightForWidth(width)
 
     def set_waiting(self, why: str) -> None:
-        """Disable the buttons for a reason, or enable them for none.
-
-        The focus comes back to the one that had it.
-        """
-        buttons = (self._resume, self._discard, self._keep, self._confirm)
-        if why and self._had_focus is None:
-            self._had_focus = next((each for each in buttons if each.hasFocus()), None)
-        for button in buttons:
-            button.set_why_not(why)
-        if not why and self._had_focus is not None:
-            give_focus(self._had_focus)
-            self._had_focus = None
-
-    def _words(self) -> RowWords:
-        raise NotImplementedError
+        """Disable the buttons for a reason, or enable them for none."""
+        self._resume.set_why_not(why)
+        self._discard.set_why_not(why)
 
     def _retranslate(self) -> None:
-        words = self._words()
+        words = self._entry.words()
         self._when.setText(words.heading)
-        asks = self._question.isVisibleTo(self)
-        self._what.setText(words.question if asks else words.description)
+        self._what.setText(words.description)
         for button, (text, name) in (
             (self._resume, words.resume),
             (self._discard, words.discard),
-            (self._keep, words.keep),
-            (self._confirm, words.discard),
         ):
             button.setText(text)
             button.setAccessibleName(name.format(words.heading))
-
-    def _on_discard_clicked(self) -> None:
-        self._ask(True)
-        self._keep.setFocus()
-
-    def _on_keep_clicked(self) -> None:
-        self._ask(False)
-        self._discard.setFocus()
-
-    def _ask(self, asks: bool) -> None:
-        self._question.setVisible(asks)
-        self._offer.setVisible(not asks)
-        self._retranslate()
-
-
-def _button_row(*buttons: QPushButton) -> QWidget:
-    row = QWidget()
-    horizontal_layout(row, *buttons)
-    return row
-
-
-LONGEST = 16  # characters of a name
-N_ROWS_SEEN = 2  # the others are scrolled to
-NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
-
-
-class InterruptedRow(InterruptedItem):
-    """One swing without a verdict."""
-
-    def __init__(
-        self, swing: Record | DamagedSwing, is_under_way: bool = False
-    ) -> None:
-        self._swing = swing
-        kind = RowKind.UNDER_WAY if is_under_way else RowKind.OFFERED
-        if isinstance(swing, DamagedSwing):
-            kind = RowKind.DAMAGED
-        super().__init__(kind)
-
-    @override
-    def _words(self) -> RowWords:
-        return RowWords(
-            self._heading(),
-            self._description(),
-            self.tr("Discard this swing? Its images remain on the disk."),
-            (self.tr("Resume"), self.tr("Resume the swing of {0}")),
-            (self.tr("Discard"), self.tr("Discard the swing of {0}")),
-            (self.tr("Keep"), self.tr("Keep the swing of {0}")),
-        )
-
-    def _heading(self) -> str:
-        match self._swing:
-            case DamagedSwing(folder):
-                return self.tr("Damaged: {0}").format(shortened(folder.name))
-            case Record(header=header):
-                return moment_text(header.created)
-
-    def _description(self) -> str:
-        if isinstance(self._swing, DamagedSwing):
-            return breakable(worded(self._swing.message))
-        if self._kind is RowKind.UNDER_WAY:
-            return self.tr("In use by another program")
-        names, n_images = recorded_names(self._swing), len(self._swing.images)
-        called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        parts = (*called, n_images_text(n_images))
-        return PARTED.join(filter(None, parts))
-
-
-class WorkRow(InterruptedItem):
-    """One work of an extension that was interrupted."""
-
-    def __init__(self, work: InterruptedWork) -> None:
-        self._work = work
-        super().__init__(RowKind.DAMAGED if work.names is None else RowKind.OFFERED)
-
-    @override
-    def _words(self) -> RowWords:
-        return self._work.words()
 
 
 class InterruptedPanel(Translated, QGroupBox):
     """Lists swings and other work that have no end; hidden while there are none."""
 
-    # Path: the folder of the record
-    resume_requested = Signal(object)
-    discard_requested = Signal(object)
-    continue_requested = Signal(object)  # InterruptedWork
-    close_requested = Signal(object)  # InterruptedWork
     search_requested = Signal()  # search again
 
     def __init__(self) -> None:
         super().__init__()
-        self._value = InterruptedSwings()
-        self._works: tuple[InterruptedWork, ...] = ()
-        self._rows: list[InterruptedItem] = []
+        self._rows: list[InterruptedRow] = []
         self._why_waiting = ""
 
         # Widgets
@@ -225,40 +103,30 @@ class InterruptedPanel(Translated, QGroupBox):
         )
         self._scroll = PageScroll()
         self._scroll.setHorizontalScrollBarPolicy(NEVER)
+        self._question = QuestionBar()
         self._again = self.make_button(self.tr("Search again"), self.search_requested)
 
         # Layout
         left = Qt.AlignmentFlag.AlignLeft
-        vertical_layout(self, self._hint, self._scroll, (self._again, 0, left))
+        vertical_layout(
+            self, self._hint, self._scroll, self._question, (self._again, 0, left)
+        )
 
         self.hide()
         self._retranslate()
 
-    def value(self) -> InterruptedSwings:
-        """Return the swings that are listed."""
-        return self._value
-
-    def set_value(
-        self, swings: InterruptedSwings, works: tuple[InterruptedWork, ...] = ()
-    ) -> None:
-        """List these swings and works of extensions."""
-        self._value, self._works = swings, works
-        self._rows = [
-            *map(self._work_row, works),
-            *(self._row(record) for record in swings.interrupted),
-            *(self._row(record, is_under_way=True) for record in swings.under_way),
-            *(self._row(swing) for swing in swings.damaged),
-        ]
-        for row in self._rows:
-            row.set_waiting(self._why_waiting)
+    def set_entries(self, entries: Sequence[InterruptedEntry]) -> None:
+        """List interrupted work."""
+        self._question.hide()
+        self._rows = [self._row(entry) for entry in entries]
         content = QWidget()
         vertical_layout(content, *self._rows, 1, margins=(0, 0, GRID, 0))
         self._scroll.setWidget(content)
-        can_go_on = any(each.names is not None for each in works)
-        self._hint.setVisible(bool(swings.interrupted) or can_go_on)
-        self._again.setVisible(bool(swings.under_way or swings.damaged))
+        self._hint.setVisible(any(each.resume for each in entries))
+        self._again.setVisible(not all(each.resume for each in entries))
+        self.set_waiting(self._why_waiting)
         self._retranslate()
-        self.setVisible(bool(self._rows))
+        self.setVisible(bool(entries))
         self._hold_rows()
 
     @override
@@ -266,8 +134,8 @@ class InterruptedPanel(Translated, QGroupBox):
         super().resizeEvent(event)
         self._hold_rows()
 
-    def rows(self) -> tuple[InterruptedItem, ...]:
-        """Return the rows: interrupted, running, and damaged."""
+    def rows(self) -> tuple[InterruptedRow, ...]:
+        """Return the rows."""
         return tuple(self._rows)
 
     def set_waiting(self, why: str) -> None:
@@ -282,28 +150,20 @@ class InterruptedPanel(Translated, QGroupBox):
         heights = (row.height_for(width) + GRID for row in self._rows[:N_ROWS_SEEN])
         self._scroll.setFixedHeight(sum(heights))
 
-    def _row(
-        self, swing: Record | DamagedSwing, is_under_way: bool = False
-    ) -> InterruptedRow:
-        row = InterruptedRow(swing, is_under_way)
-        folder = swing.folder
-        row.resume_requested.connect(lambda: self.resume_requested.emit(folder))
-        row.discard_requested.connect(lambda: self.discard_requested.emit(folder))
+    def _row(self, entry: InterruptedEntry) -> InterruptedRow:
+        row = InterruptedRow(entry)
+        row.discard_requested.connect(lambda: self._ask(entry))
         return row
 
-    def _work_row(self, work: InterruptedWork) -> WorkRow:
-        row = WorkRow(work)
-        row.resume_requested.connect(lambda: self.continue_requested.emit(work))
-        row.discard_requested.connect(lambda: self.close_requested.emit(work))
-        return row
+    def _ask(self, entry: InterruptedEntry) -> None:
+        """Ask below the rows, so that a double click discards nothing."""
+
+        def question() -> Question:
+            words = entry.words()
+            asked = f"{words.heading}: {words.question}"
+            return Question(asked, words.discard[0], self.tr("Keep"))
+
+        self._question.ask_about(question, entry.discard or bool)
 
     def _retranslate(self) -> None:
-        self.setTitle(self._title())
-
-    def _title(self) -> str:
-        n_rows = len(self._rows)
-        if self._works:
-            return self.tr("Interrupted: {0}").format(n_rows)
-        if n_rows > 1:
-            return self.tr("Interrupted swings: {0}").format(n_rows)
-        return self.tr("Interrupted swing")
+        self.setTitle(self.tr("Interrupted: {0}").format(len(self._rows)))

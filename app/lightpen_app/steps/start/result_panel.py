@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import QGroupBox
 
 from lightpen.local_time import local_time
 from lightpen.model.limits import DueRule
@@ -14,12 +14,7 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import TipStatus
 from lightpen.record.results.results import Result
 from lightpen.swing.preparation import Preparation
-from lightpen_app.look.layouts import (
-    fill,
-    grid_layout,
-    horizontal_layout,
-    vertical_layout,
-)
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, moment_text, shortened
@@ -32,6 +27,7 @@ from lightpen_app.widgets.state_banner import (
     origin_message,
     status_message,
 )
+from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.selection import Selection
@@ -74,11 +70,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._grade = SignLabel(wraps=False)
         self._status = SignLabel(wraps=False)
         self._when = text_label(TextSize.SMALL, Tone.QUIET)
-        self._table = QWidget()
-        self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
-        self._axes = [text_label(TextSize.BODY) for _ in AXES]
-        self._tip = [_cell() for _ in AXES]
-        self._uncertainty = [_cell(tone=Tone.QUIET) for _ in AXES]
+        self._table = NumberTable()
         self._origin = SignLabel()
         self._reason = SignLabel()
         self._warning = SignLabel()
@@ -106,16 +98,6 @@ class LastResultPanel(Translated, QGroupBox):
         horizontal_layout(layout, self._age, *marks, 1, spacing=2 * GRID)
         fill(layout, self._when, self._table, self._origin, self._reason)
         fill(layout, self._warning)
-        margins = (0, GRID // 2, 0, GRID // 2)
-        table = grid_layout(self._table, spacing=(4 * GRID, GRID // 2), margins=margins)
-        for column, head in enumerate(self._heads):
-            table.addWidget(head, 0, column)
-        for row, axis in enumerate(AXES, start=1):
-            self._axes[row - 1].setText(axis)
-            table.addWidget(self._axes[row - 1], row, 0)
-            table.addWidget(self._tip[row - 1], row, 1)
-            table.addWidget(self._uncertainty[row - 1], row, 2)
-        table.setColumnStretch(3, 1)
         horizontal_layout(layout, self._verify, self._take_back, 1)
         fill(layout, self._question, self._withdrawal)
 
@@ -131,10 +113,8 @@ class LastResultPanel(Translated, QGroupBox):
         """Scale its figures to the size of the window."""
         age, words, figures = SIZES[room.is_large]
         set_size(self._age, age)
-        for label in (self._when, *self._heads):
-            set_size(label, words)
-        for cell in (*self._axes, *self._tip, *self._uncertainty):
-            set_size(cell, figures)
+        set_size(self._when, words)
+        self._table.set_letters(figures)
 
     def set_value(self, value: LastResult) -> None:
         """Show another result, or why there is none."""
@@ -165,12 +145,9 @@ class LastResultPanel(Translated, QGroupBox):
         marks = [each.value().text for each in (self._grade, self._status)]
         lines = [self._age.text(), *marks, self._when.text()]
         if self._value.result is not None:
-            lines += [
-                f"{axis} {tip.text()} {uncertainty.text()}"
-                for axis, tip, uncertainty in zip(
-                    AXES, self._tip, self._uncertainty, strict=True
-                )
-            ]
+            shown = self._table.value()
+            rows = zip(shown.rows, shown.cells, strict=True)
+            lines += [" ".join((axis, *cells)) for axis, cells in rows]
         remarks = (self._origin, self._reason, self._warning)
         lines += [remark.value().text for remark in remarks]
         return tuple(filter(None, lines))
@@ -233,13 +210,10 @@ class LastResultPanel(Translated, QGroupBox):
         when = moment_text(result.accepted)
         by = shortened(result.names.operator)
         self._when.setText(PARTED.join(filter(None, (when, by))))
-        heads = ("", self.tr("Tip centre / mm"), self.tr("U (k = 2) / mm"))
-        for head, text in zip(self._heads, heads, strict=True):
-            head.setText(text)
-        for axis in range(3):
-            self._tip[axis].setText(mm_text(float(result.tip_pen[axis])))
-            uncertainty = mm_text(float(result.uncertainty[axis]))
-            self._uncertainty[axis].setText(uncertainty)
+        heads = self.tr("Tip centre / mm"), self.tr("U (k = 2) / mm")
+        numbers = zip(result.tip_pen.tolist(), result.uncertainty.tolist(), strict=True)
+        cells = tuple(tuple(map(mm_text, row)) for row in numbers)
+        self._table.set_value(Figures(heads, AXES, cells))
         self._origin.set_value(origin_message(result.origin))
         self._reason.set_value(self._reason_of(result))
         self._warning.set_value(self._warning_of(result, now))
@@ -296,15 +270,6 @@ class LastResultPanel(Translated, QGroupBox):
         if days < 2 * DAYS_IN_YEAR:
             return self.tr("{0} months ago").format(days // DAYS_IN_MONTH)
         return self.tr("{0} years ago").format(days // DAYS_IN_YEAR)
-
-
-def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
-    label = text_label(size, tone)
-    label.setWordWrap(False)
-    label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    flags = Qt.TextInteractionFlag.TextSelectableByMouse
-    label.setTextInteractionFlags(flags)
-    return label
 
 
 class LastResultPresenter(QObject):

@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum, auto
-from math import isfinite
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QObject
 
 from lightpen.cameras.protocol import Connection
-from lightpen.model.limits import SwingLimits
 from lightpen.swing.capture.guidance import Shortfall, measure_shortfall, missing
 from lightpen.swing.capture.kept_images import AcceptedImages
 from lightpen.swing.capture.rules import stillness
@@ -18,11 +16,7 @@ from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.look.words import TimeLeft
-from lightpen_app.steps.swing.view_state import (
-    LiveDetectionView,
-    RemainingImages,
-    SwingViewState,
-)
+from lightpen_app.steps.swing.view_state import LiveDetectionView, SwingViewState
 from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.bars import Question
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -87,41 +81,6 @@ class SwingPageState:
     knows_side: bool  # whether the operator may say that left and right are swapped
 
 
-@dataclass(frozen=True, eq=False)
-class SwingProgress:
-    """Missing images of a swing, computed once for each accepted image."""
-
-    kept: AcceptedImages
-    record_folder: Path | None
-    limits: SwingLimits
-    short: Shortfall
-    # Displayed number of remaining images; None if none is displayed.
-    to_go: RemainingImages | None
-
-
-def advance_progress(
-    before: SwingProgress | None, status: SwingStatus
-) -> SwingProgress | None:
-    """Return the shortfall of the swing; None without a swing."""
-    state, setup = status.state, status.setup
-    if state is None or setup is None:
-        return None
-    if before is not None and before.kept is state.kept:
-        return before
-    short = measure_shortfall(setup, state)
-    swing = status.record_folder, setup.limits
-    to_go = None
-    if before is not None and swing == (before.record_folder, before.limits):
-        to_go = before.to_go
-    if not isfinite(state.kept.uncertainty):
-        to_go = None
-    elif to_go is None:
-        to_go = RemainingImages.first(short.n_more, state.n_kept)
-    else:
-        to_go = to_go.after(short.n_more, state.n_kept)
-    return SwingProgress(state.kept, *swing, short, to_go)
-
-
 class SwingPresenter(QObject):
     """Computes the page state; counts images beside the swing."""
 
@@ -129,7 +88,8 @@ class SwingPresenter(QObject):
         super().__init__(parent)
         self._run, self._live = run, live
         self._words = SwingWords(self)
-        self._progress: SwingProgress | None = None
+        self._kept: AcceptedImages | None = None
+        self._short: Shortfall | None = None  # of these images
         self.sight = LiveDetectionView(run, self)
         self.solved = 0.0  # how far the tip is computed, 0 to 1
         self._time_left = TimeLeft()
@@ -139,13 +99,15 @@ class SwingPresenter(QObject):
         """Return the view state of the swing; None without one."""
         status = self._run.status
         state, setup = status.state, status.setup
-        self._progress = progress = advance_progress(self._progress, status)
-        if state is None or setup is None or progress is None:
+        if state is None or setup is None:
+            self._kept = self._short = None
             return None
+        if self._short is None or state.kept is not self._kept:
+            self._kept, self._short = state.kept, measure_shortfall(setup, state)
         view = SwingViewState(
             setup=setup,
             state=state,
-            short=progress.short,
+            short=self._short,
             connection=self._live.worst_connection,
             seen=self.sight.words(),
             has_unfit_spots=self.sight.has_unfit_spots(),
@@ -157,7 +119,6 @@ class SwingPresenter(QObject):
             origin=status.origin,
             is_simulated=self._live.operator is not None,
             is_away=is_away,
-            to_go=progress.to_go,
         )
         return replace(view, time_left=self._job_time_left(view))
 
@@ -174,10 +135,10 @@ class SwingPresenter(QObject):
 
     def fraction_kept(self) -> float:
         """Return the fraction of accepted images, 0 to 1."""
-        state, progress = self._run.status.state, self._progress
-        if state is None or progress is None:
+        state, short = self._run.status.state, self._short
+        if state is None or short is None:
             return 0.0
-        return state.n_kept / max(state.n_kept + progress.short.n_more, 1)
+        return state.n_kept / max(state.n_kept + short.n_more, 1)
 
     def page_state(self, *, is_away: bool) -> SwingPageState:
         """Return the page state."""

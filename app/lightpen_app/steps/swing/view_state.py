@@ -4,7 +4,6 @@ from collections import deque
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
-from typing import Self
 
 from PySide6.QtCore import QObject
 
@@ -19,62 +18,14 @@ from lightpen_app.widgets.posture_dial import DialValue
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.swing_run import SwingRun
 
-# Of the images to go: from so many on, rounded up to this.
+# Of the images to go: from so many on, their number in all is rounded up to this.
 STEPS = ((30, 10), (10, 5), (-1, 1))
-LEAST_ERROR = 2  # images; a smaller change of the estimate is not shown
 
 
-@dataclass(frozen=True)
-class RemainingImages:
-    """Displayed number of images, in all and remaining.
-
-    The estimate is renewed with each image and fluctuates. The displayed number in all
-    stays until it is wrong by more than the accuracy of the estimate.
-    """
-
-    # Images at the end; the remaining ones are rounded to the accuracy of the estimate.
-    n_in_all: int
-    n_kept: int  # present images
-    n_before: int  # remaining images at the last change of ``n_in_all``
-    fraction: float  # of all images; decreases only when images are excluded
-    # Whether the last change increased the number, although none were excluded.
-    has_risen: bool = False
-
-    @property
-    def n_images(self) -> int:
-        """Remaining images."""
-        return self.n_in_all - self.n_kept
-
-    @classmethod
-    def first(cls, n_more: int, n_kept: int) -> Self:
-        """Return the first displayed number of a swing."""
-        n_images = in_true_steps(n_more)
-        n_in_all = n_kept + n_images
-        return cls(n_in_all, n_kept, n_images, n_kept / max(n_in_all, 1))
-
-    def after(self, n_more: int, n_kept: int) -> Self:
-        """Return the displayed number after the next estimate."""
-        now = self.first(n_more, n_kept)
-        if n_kept < self.n_kept:
-            return now
-        is_enough = n_kept + min(n_more, 1) <= self.n_in_all
-        error = abs(n_kept + n_more - self.n_in_all)
-        if is_enough and error <= max(_step(n_more), LEAST_ERROR):
-            fraction = n_kept / max(self.n_in_all, 1)
-            now = replace(self, n_kept=n_kept, fraction=fraction)
-        else:
-            now = replace(now, has_risen=now.n_before > self.n_before)
-        return replace(now, fraction=max(now.fraction, self.fraction))
-
-
-def in_true_steps(n_more: int) -> int:
-    """Return the number rounded up to the accuracy of the estimate."""
-    step = _step(n_more)
-    return ceil(n_more / step) * step
-
-
-def _step(n_more: int) -> int:
-    return next(step for least, step in STEPS if n_more > least)
+def n_in_all_about(n_kept: int, n_more: int) -> int:
+    """Return the number of images at the end, to the accuracy of the estimate."""
+    step = next(step for least, step in STEPS if n_more > least)
+    return ceil((n_kept + n_more) / step) * step
 
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
@@ -103,7 +54,6 @@ class SwingViewState:
     # Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_simulated: bool = False
     is_away: bool = False  # whether another step is shown
-    to_go: RemainingImages | None = None
     time_left: str = ""  # of reading recorded images, or of the computation
 
     @cached_property
@@ -120,15 +70,9 @@ class SwingViewState:
         return posture_of(self.setup.pen, detection.rotation)
 
     @property
-    def remaining(self) -> RemainingImages:
-        """The number of images, as it is displayed."""
-        first = RemainingImages.first(self.short.n_more, self.state.n_kept)
-        return first if self.to_go is None else self.to_go
-
-    @property
-    def n_more(self) -> int:
-        """Remaining images, no more than displayed."""
-        return min(self.short.n_more, self.remaining.n_images)
+    def n_in_all(self) -> int:
+        """The number of images at the end, as it is displayed."""
+        return n_in_all_about(self.state.n_kept, self.short.n_more)
 
     @property
     def fraction(self) -> float | None:
@@ -141,7 +85,7 @@ class SwingViewState:
                 return self.solving or 0.0
         if self.setup.is_recording:
             return progress.n_read / max(progress.n_images, 1)
-        return self.remaining.fraction
+        return self.state.n_kept / max(self.n_in_all, 1)
 
     @property
     def asks_upright(self) -> bool:

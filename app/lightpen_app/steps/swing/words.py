@@ -114,18 +114,8 @@ class SwingWords(QObject):
             text = ""
         n_dropped = sum(view.state.n_dropped.values())
         rejected = self.tr("{0} rejected").format(n_dropped) if n_dropped else ""
-        parts = self._time_left(view), text, rejected, self._why_more(view)
+        parts = self._time_left(view), text, rejected
         return PARTED.join(filter(None, parts))
-
-    def _why_more(self, view: SwingViewState) -> str:
-        """Return why more images are to go than before."""
-        is_counted = view.state.phase is Phase.CAPTURING
-        if not is_counted or view.to_go is None or not view.to_go.has_risen:
-            return ""
-        short = view.short
-        if short.n_for_uncertainty >= short.n_more:
-            return self.tr("More images needed: U (k = 2) has increased")
-        return self.tr("More images needed to complete the postures")
 
     def warning(self, view: SwingViewState) -> StatusMessage:
         """Return a warning that no swing can resolve."""
@@ -286,7 +276,7 @@ class SwingWords(QObject):
             least = view.setup.limits.min_images
             return self.tr("{0} of {1} (minimum)").format(n_kept, least)
         words = self.tr("{0} of about {1} images")
-        return words.format(n_kept, view.remaining.n_in_all)
+        return words.format(n_kept, view.n_in_all)
 
     def _read(self, view: SwingViewState) -> str:
         """Return the progress of reading a recording; empty before the first image."""
@@ -307,7 +297,7 @@ class SwingWords(QObject):
         period = images_period(times[times > state.time - PACE_S])
         if period is None or view.lacks_images:
             return ""
-        return time_left_text(view.n_more * period)
+        return time_left_text(view.short.n_more * period)
 
     def _keys(self, view: SwingViewState) -> str:
         if view.is_away:

@@ -39,7 +39,7 @@ from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.steps.camera.exposure_panel import ExposureBar, FocusPanel
+from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel, PartDialog
 from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.page import CameraPage
@@ -79,7 +79,7 @@ def crossed(seen: "Seen") -> list[Marker]:
 
 
 def exposure(seen: "Seen") -> str:
-    return seen.child(ExposureBar).accessibleDescription()
+    return seen.child(ExposurePanel).verdict().text
 
 
 @pytest.fixture

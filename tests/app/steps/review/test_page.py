@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import pytest
 from benchmarks.small_records import small_record
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QThreadPool, QUrl
-from PySide6.QtGui import QImage, QMouseEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QUrl
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -32,7 +32,6 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.patience import PATIENCE_MS
-from tests.app.pictures import colors_in
 from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
 from tests.simulated_plans import still_view
@@ -61,7 +60,7 @@ from lightpen.swing.swing_recorder import (
     record_header,
     recorded_setup,
 )
-from lightpen_app.look.theme import Tone, colors_of
+from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.page import ReviewPage
@@ -78,7 +77,7 @@ from lightpen_app.steps.review.result_panel import (
 )
 from lightpen_app.widgets.bars import JobProgress, QuestionBar, ReasonBar, WithdrawalBar
 from lightpen_app.widgets.controls import PushButton
-from lightpen_app.widgets.figure import MARK_HEIGHT, PNG_SCALE, Figure
+from lightpen_app.widgets.figure import Figure
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
@@ -105,7 +104,6 @@ W = TypeVar("W", bound=QWidget)
 
 LEFT = Qt.MouseButton.LeftButton
 N_IMAGES = 20
-N_PLOTS = 9
 DAMAGED = 7
 SLIPPED = 9
 TURNED = 13
@@ -823,7 +821,7 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     folder = tmp_path / "saved"
     folder.mkdir()
     for _ in range(2):
-        save(bed, page, "Record, tables and plots...", folder)
+        save(bed, page, "Record and tables...", folder)
 
     stem = f"LP-04_T-10_{workbench.around.now():%Y-%m-%d}"
     names = {path.name for path in folder.iterdir()}
@@ -835,7 +833,6 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     rows = (folder / f"{stem}_images.csv").read_text().splitlines()
     assert len(rows) == N_IMAGES + 1
     assert "live camera" in (folder / f"{stem}_tip.csv").read_text()
-    assert len([name for name in names if name.endswith(".png")]) == 2 * N_PLOTS
     assert workbench.settings.export_folder() == str(folder)
 
 
@@ -877,35 +874,6 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
         *("Hall 2", "a@b.de", "Berlin", "DE"), procedure="WI 7", place="customer"
     )
     assert workbench.settings.laboratory() == laboratory
-
-
-@pytest.mark.slow
-def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
-    bed: Bed, tmp_path: Path
-) -> None:
-    recorded = replace(bed, origin=Origin.RECORDED)
-    recorded.solve()
-    page = recorded.show()
-    folder = tmp_path / "saved"
-    folder.mkdir()
-    save(recorded, page, "All plots (PNG)...", folder)
-    look_at_all_tabs(page)
-    save(recorded, page, "All plots (PNG)...", folder)
-
-    pictures = {path.stem: QImage(str(path)) for path in folder.iterdir()}
-    assert len(pictures) == 2 * N_PLOTS
-    for name, picture in pictures.items():
-        if not name.endswith("-2"):
-            later = pictures[f"{name}-2"]
-            assert picture.width() == pytest.approx(later.width(), rel=0.1), name
-            assert picture.height() == pytest.approx(later.height(), rel=0.1), name
-    colors = colors_of(page.palette())
-    for name, picture in pictures.items():
-        middle, height = picture.width() // 2, PNG_SCALE * MARK_HEIGHT
-        foot = QRect(
-            middle, picture.height() - height, picture.width() - middle, height
-        )
-        assert colors_in(picture.copy(foot)) >= {colors.panel, colors.warn}, name
 
 
 @pytest.mark.slow

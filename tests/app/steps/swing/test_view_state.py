@@ -19,11 +19,7 @@ from lightpen.swing.capture.state import (
     SwingState,
     start_swing,
 )
-from lightpen_app.steps.swing.view_state import (
-    RemainingImages,
-    SwingViewState,
-    in_true_steps,
-)
+from lightpen_app.steps.swing.view_state import SwingViewState, n_in_all_about
 from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
@@ -114,12 +110,12 @@ def test_a_lost_pen_is_not_said_to_show_its_leds(words: SwingWords) -> None:
     assert shown.state.detail == "10 of 10 LEDs"
 
 
-def test_images_to_go_are_reported_in_true_steps() -> None:
-    reported = [
-        in_true_steps(n_more) for n_more in (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)
-    ]
+def test_images_are_reported_in_steps_as_true_as_the_estimate() -> None:
+    more = (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)
 
-    assert reported == [0, 1, 9, 10, 15, 20, 30, 40, 50, 240]
+    reported = [n_in_all_about(50, n_more) for n_more in more]
+
+    assert reported == [50, 51, 59, 60, 65, 70, 80, 90, 100, 290]
 
 
 def test_what_the_files_leave_open_is_reported_during_the_swing(
@@ -168,37 +164,6 @@ def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     assert words.pen_posture(replace(at_verdict(), setup=nobody)) is None
 
 
-def displayed(*estimates: tuple[int, int]) -> list[RemainingImages]:
-    """Return what is displayed after each estimate: images to go, images so far."""
-    found = [RemainingImages.first(*estimates[0])]
-    for n_more, n_kept in estimates[1:]:
-        found.append(found[-1].after(n_more, n_kept))
-    return found
-
-
-def test_the_images_in_all_follow_no_chance_change_of_the_estimate() -> None:
-    found = displayed((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51), (4, 54))
-
-    assert [to_go.n_in_all for to_go in found] == [55, 55, 62, 55, 55, 55, 58]
-
-
-def test_the_progress_of_a_swing_never_goes_back_and_ends_at_no_more_than_all() -> None:
-    rising = [(40, n_kept) for n_kept in range(20, 60)]
-    found = displayed(*rising, *((1, n_kept) for n_kept in range(60, 90)))
-
-    fractions = [to_go.fraction for to_go in found]
-    assert fractions == sorted(fractions)
-    assert all(to_go.n_kept < to_go.n_in_all for to_go in found)
-    assert fractions[-1] < 1
-
-
-def test_more_is_to_go_after_images_were_dropped() -> None:
-    before, after = displayed((4, 50), (10, 44))
-
-    assert (before.n_images, after.n_images) == (4, 10)
-    assert after.fraction < before.fraction
-
-
 def test_after_the_capture_no_limit_is_named_but_what_was_rejected(
     words: SwingWords,
 ) -> None:
@@ -207,16 +172,3 @@ def test_after_the_capture_no_limit_is_named_but_what_was_rejected(
 
     assert words.note(moment(done)) == ""
     assert words.note(moment(dropped)) == "12 rejected"
-
-
-def test_a_rise_that_is_no_chance_is_reported_with_its_reason(
-    words: SwingWords,
-) -> None:
-    to_go = RemainingImages.first(4, 50).after(4, 51).after(40, 52)
-    assert (to_go.n_images, to_go.has_risen) == (40, True)
-    capturing = replace(start_swing(SETUP), phase=Phase.CAPTURING)
-
-    note = words.note(moment(capturing, to_go=to_go))
-    assert note == "at most 300 images  ·  More images needed: U (k = 2) has increased"
-    calm = words.note(moment(capturing, to_go=to_go.after(20, 53)))
-    assert "More images needed:" not in calm
