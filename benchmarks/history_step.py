@@ -49,7 +49,7 @@ def main(data: Path) -> int:
         page.entered()
         table = page.findChild(HistoryTable)
         assert isinstance(table, HistoryTable)
-        while not table.n_lines() and time.perf_counter() < start + LONGEST_S:
+        while not table.model().rowCount() and time.perf_counter() < start + LONGEST_S:
             QApplication.processEvents()
         table.viewport().repaint()
         opened_s = time.perf_counter() - start
@@ -68,13 +68,13 @@ def main(data: Path) -> int:
                 QApplication.processEvents()
                 longest = max(longest, time.perf_counter() - turn)
             blocked.append(longest)
-        last = table.model().index(table.n_lines() - 1, WHEN, QModelIndex())
+        last = table.model().index(table.model().rowCount() - 1, WHEN, QModelIndex())
         bar.setValue(bar.maximum())
         stopped = time.perf_counter()
         while last.data() == UNREAD and time.perf_counter() < stopped + LONGEST_S:
             QApplication.processEvents()
         reported = {
-            "n_lines": table.n_lines(),
+            "n_lines": table.model().rowCount(),
             "opened_ms": 1000 * opened_s,
             "blocked_ms": 1000 * statistics.quantiles(blocked, n=20)[-1],
             "longest_blocked_ms": 1000 * max(blocked),

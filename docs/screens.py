@@ -393,7 +393,7 @@ class Stage:
 
     def _n_shown(self) -> int:
         table = self.wizard.window.page().findChild(HistoryTable)
-        return table.n_lines() if isinstance(table, HistoryTable) else 0
+        return table.model().rowCount() if isinstance(table, HistoryTable) else 0
 
     def solve(self) -> None:
         """Record a swing and solve it, so that the review opens."""

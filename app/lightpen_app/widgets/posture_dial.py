@@ -14,7 +14,6 @@ from PySide6.QtGui import (
     QPainterPath,
     QPaintEvent,
     QPen,
-    QPixmap,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -104,9 +103,6 @@ class PostureDial(Translated, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._value = DialValue()
-        self._ground = QPixmap()
-        self._ground_shows: tuple[object, ...] = ()
-        self._drawn_images: dict[_Field, tuple[int, int]] = {}  # of each field drawn
         self._least_letters: float = TextSize.SMALL
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         policy.setHeightForWidth(True)
@@ -158,7 +154,9 @@ class PostureDial(Translated, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colors = colors_of(self.palette())
         middle, rim, bar = self._places()
-        painter.drawPixmap(0, 0, self._drawn_ground(colors))
+        self._draw_surroundings(painter, middle, rim, bar)
+        for place in _fields():
+            self._draw_field(painter, middle, rim, place, colors)
         target = self._value.target
         marked = _Field(*field_of(target)) if target else None
         if marked:
@@ -173,47 +171,23 @@ class PostureDial(Translated, QWidget):
             painter.setPen(QPen(QColor(colors.accent), 2))
             painter.drawEllipse(middle, 1.02 * rim, 1.02 * rim)
 
-    def _drawn_ground(self, colors: Colors) -> QPixmap:
-        """Return a picture of camera and fields; only changed ones are drawn anew."""
-        value, scale = self._value, self.devicePixelRatio()
-        legend = self.tr("images\nneeded") if value.n_full < value.n_fields else ""
-        shows = (
-            self.size().toTuple(),
-            scale,
-            colors,
-            camera := self.tr("camera"),
-            legend,
-            self._least_letters,
-            value.heading,
+    def _draw_surroundings(
+        self, painter: QPainter, middle: QPointF, rim: float, bar: QRectF
+    ) -> None:
+        """Draw the camera, and what the numbers mean while there are any."""
+        value, colors = self._value, colors_of(self.palette())
+        size = max(LEGEND_SHARE * rim, self._least_letters)
+        draw_camera(
+            painter,
+            QRectF(0, 0, self.width(), bar.top()),
+            CameraPosition(middle, rim, value.heading - math.pi / 2),
+            self.tr("camera"),
+            size,
+            QColor(colors.muted),
         )
-        if shows != self._ground_shows:
-            self._ground = QPixmap(self.size() * scale)
-            self._ground.setDevicePixelRatio(scale)
-            self._ground.fill(Qt.GlobalColor.transparent)
-            self._drawn_images.clear()
-        images = {place: self._images(place) for place in _fields()}
-        changed = [at for at in images if images[at] != self._drawn_images.get(at)]
-        if not changed:
-            return self._ground
-        painter = QPainter(self._ground)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        middle, rim, bar = self._places()
-        if shows != self._ground_shows:
-            size = max(LEGEND_SHARE * rim, self._least_letters)
-            draw_camera(
-                painter,
-                QRectF(0, 0, self.width(), bar.top()),
-                CameraPosition(middle, rim, value.heading - math.pi / 2),
-                camera,
-                size,
-                QColor(colors.muted),
-            )
-            self._draw_legend(painter, middle, rim, legend, size)
-        for place in changed:
-            self._draw_field(painter, middle, rim, place, colors)
-        painter.end()
-        self._ground_shows, self._drawn_images = shows, images
-        return self._ground
+        if value.n_full < value.n_fields:
+            text = self.tr("images\nneeded")
+            self._draw_legend(painter, middle, rim, text, size)
 
     def _draw_legend(
         self, painter: QPainter, middle: QPointF, rim: float, text: str, size: float
@@ -264,12 +238,6 @@ class PostureDial(Translated, QWidget):
         kept, needed = self._images(place)
         done = kept >= needed > 0
         outline = _outline(middle, rim, place, self._value.heading)
-        # What it showed goes, or its smoothed edges would grow with each drawing.
-        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Clear)
-        painter.setPen(QPen(Qt.GlobalColor.black, 2))
-        painter.setBrush(Qt.GlobalColor.black)
-        painter.drawPath(outline)
-        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_SourceOver)
         painter.setPen(QPen(QColor(colors.line), 1))
         painter.setBrush(QColor(colors.good if done else colors.raised))
         painter.drawPath(outline)

@@ -232,30 +232,6 @@ def test_the_fields_are_drawn_anew_for_what_else_changes_them(
     assert seen(dial).pixelColor(place.toPoint()).name() == LIGHT.raised
 
 
-@pytest.mark.parametrize("side", [SIDE, 200])
-def test_a_field_drawn_alone_leaves_no_trace_of_what_it_showed(
-    qtbot: QtBot, side: int
-) -> None:
-    some, more = WANTED.copy(), WANTED.copy()
-    some[0, 3], some[1, 5], more[0, 3] = 2, 1, 3
-    steps = [
-        DialValue(counts=counts, needed=WANTED, n_upright=n, n_upright_needed=6)
-        for counts, n in ((some, 6), (WANTED - 1, 2), (more, 3), (0 * WANTED, 0))
-    ]
-    images = []
-    for values in (steps, steps[-1:]):
-        dial = PostureDial()
-        qtbot.addWidget(dial)
-        dial.resize(side, round(side * (1 + BAR_SHARE)))
-        for value in values:
-            dial.set_value(value)
-            image = seen(dial)
-        images.append(reds(image))
-
-    differ = np.abs(images[0] - images[1]) > 8
-    assert differ.mean() < 1e-3  # of smoothed edges
-
-
 def n_muted(image: QImage) -> float:
     """Return how much is drawn in the colour of quiet words, in whole pixels."""
     ground, ink = (QColor(each).red() for each in (DARK.line, DARK.muted))
