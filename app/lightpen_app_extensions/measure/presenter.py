@@ -288,11 +288,9 @@ class VerifyPresenter(QObject):
             return self.tr("Not verified")
         if found.grade is Grade.CHECK:
             return self.tr("Check needed")
-        if found.grade is Grade.PASS:
-            return self.tr("Tip verified")
         if found.grade is Grade.STEADY:
             return self.tr("Nothing moved")
-        return self.tr("Scale and form verified")
+        return self.tr("Tip verified")
 
     def _probing(self, setup: SessionSetup, state: SessionState) -> tuple[str, State]:
         """Return a few words on what to do, and what is seen of the pen."""

@@ -4899,10 +4899,6 @@ needed</source>
         <translation>测头已通过验证</translation>
     </message>
     <message>
-        <source>Scale and form verified</source>
-        <translation>比例和形状已验证</translation>
-    </message>
-    <message>
         <source>Check needed</source>
         <translation>需检查</translation>
     </message>

@@ -50,7 +50,7 @@ SENTENCES = (
     (r"Object contains unknown field `(.+?)`", "the entry {0!r} is unknown"),
     (r"Invalid enum value '(.+?)'", "{0!r} is no word that the plan knows there"),
     (r"Expected `.*` (>=|<=|>|<) (.+)", "the number must be {0} {1}"),
-    (r"Expected `array` of length (\d+).*", "a list of {0} is needed"),
+    (r"Expected `array` of length (?:>= )?(\d+).*", "a list of {0} is needed"),
 )
 
 
@@ -134,9 +134,12 @@ def _of_characteristic(
     plan: Plan, each: PlannedCharacteristic, kinds: Mapping[str, FeatureKind | None]
 ) -> Iterator[str]:
     yield from _unknown(each.features, kinds)
+    if len({*each.features}) < len(each.features):
+        yield "it names one feature twice"
     # WORKAROUND for msgspec 0.22: bounds of a number in a union with a tuple fail.
     ends = np.atleast_1d(0.0 if each.tolerance is None else each.tolerance)
-    if not (np.abs(ends) <= FARTHEST).all() or ends[0] > ends[-1]:
+    width = ends[-1] - ends[0] if len(ends) > 1 else ends[0]
+    if not (np.abs(ends) <= FARTHEST).all() or width < 0:
         yield f"the tolerance {each.tolerance} is none"
     is_deviation = each.quantity in DEVIATIONS
     if is_deviation and each.tolerance is not None and len(ends) > 1:

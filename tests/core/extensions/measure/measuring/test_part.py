@@ -406,6 +406,8 @@ def test_u_covers_a_feature_whose_few_points_deviate_by_form(form: float) -> Non
         ("{quantity: diameter, of: hole, nominal: big}", "nominal: .* a number"),
         ("{quantity: x, of: hole, colour: red}", "the entry 'colour' is unknown"),
         ("{quantity: position, of: hole, tolerance: 0.1}", "nominal origin"),
+        ("{quantity: flatness, of: top, tolerance: -0.1}", "tolerance -0.1 is none"),
+        ("{quantity: distance, of: [hole, hole]}", "names one feature twice"),
     ],
 )
 def test_an_entry_that_makes_no_sense_is_refused_before_anything_is_measured(
