@@ -14,7 +14,6 @@ References
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -254,10 +253,11 @@ def _range(heights: Quantity, inputs: FloatArray) -> Value:
 
 
 def _length(offset: Quantity, factor: float, inputs: FloatArray) -> Value:
-    """Return the length of an offset times a factor, with its U."""
-    errors = factor * np.linalg.norm(_draws(offset.by_inputs, inputs), axis=1)
-    value = factor * float(np.linalg.norm(offset.values))
-    return Value(value, float(np.quantile(errors, COVERAGE)))
+    """Return the largest length of offsets, (3 n,), times a factor, with its U."""
+    errors = _draws(offset.by_inputs, inputs).reshape(N_DRAWS, -1, 3)
+    longest = np.linalg.norm(errors, axis=2).max(axis=1)
+    value = np.linalg.norm(offset.values.reshape(-1, 3), axis=1).max()
+    return Value(factor * float(value), factor * float(np.quantile(longest, COVERAGE)))
 
 
 def _orientation(
@@ -321,7 +321,7 @@ def _position(
     axis = stated / np.linalg.norm(stated)
     if one.kind in FLAT:
         return _length(
-            derive(lambda values: (values[PLACE] - place) @ axis, one.in_part),
+            derive(lambda values: (values[PLACE] - place) @ axis * axis, one.in_part),
             2.0,
             inputs,
         )
@@ -341,11 +341,11 @@ def _at_ends(
 ) -> Value:
     """Return twice the larger offset at both ends of an axis, or at a centre."""
     half = _extent(one) / 2 if one.kind in AXIAL else 0.0
-    ends = [
-        _length(derive(partial(offset, shift=shift), *quantities), 2.0, inputs)
-        for shift in {half, -half}
-    ]
-    return max(ends, key=lambda end: end.value)
+
+    def offsets(*values: FloatArray) -> FloatArray:
+        return np.concatenate([offset(*values, shift=each) for each in (half, -half)])
+
+    return _length(derive(offsets, *quantities), 2.0, inputs)
 
 
 def _concentricity(one: Measured, datum: Measured, inputs: FloatArray) -> Value:
