@@ -13,7 +13,6 @@ from lightpen.errors import UsageError
 from lightpen.formats.pen_tables import UNITS
 from lightpen.formats.rig_files import write_window
 from lightpen.messages import message
-from lightpen.model.limits import COLDEST, WARMEST
 from lightpen.record.library.supervision import Signature
 
 DataFolder: TypeAlias = Callable[[], Path]
@@ -186,29 +185,6 @@ def add_pen_options(parser: argparse.ArgumentParser) -> None:
         type=finite,
         metavar="MM",
         help="diameter of the LED discs if the LED file does not state it (10)",
-    )
-
-
-def add_conditions(
-    parser: argparse.ArgumentParser, *names: str, meaning: str = "for the record"
-) -> None:
-    """Add options for the measured environment.
-
-    ``names`` are other names of the option for the temperature of the pen, ``meaning``
-    is what that is for.
-    """
-    parser.add_argument(
-        *names,
-        "--pen-temperature",
-        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
-        metavar="CELSIUS",
-        help=f"pen temperature, {meaning}",
-    )
-    parser.add_argument(
-        "--humidity",
-        type=number_from(0.0, 100.0, "relative humidity", "%"),
-        metavar="PERCENT",
-        help="relative humidity, for the record",
     )
 
 

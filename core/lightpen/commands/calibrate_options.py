@@ -1,13 +1,13 @@
 """The options of ``lightpen calibrate``."""
 
 import argparse
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import fields, replace
 from pathlib import Path
 
 from lightpen.commands.arguments import (
     add_bits,
     add_cameras_and_pen,
-    add_conditions,
     add_json,
     add_pen_options,
     finite,
@@ -16,7 +16,9 @@ from lightpen.commands.arguments import (
 from lightpen.model.limits import USUAL, Assumptions, with_focal_length
 from lightpen.model.names import METHODS
 
-SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
+SHARE = "SHARE"  # unit of a relative number
+# What `Assumptions` describes as options.
+STATED = tuple(each for each in fields(Assumptions) if each.metadata)
 
 
 def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
@@ -54,37 +56,25 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--camera-sigma",
-        type=_share,
-        metavar="SHARE",
+        type=_number(SHARE, 1e-9, 0.1),
+        metavar=SHARE,
         help="standard uncertainty of the focal length, for example 0.5%%, if the "
         "intrinsics file states none; other intrinsics are scaled with it",
     )
-    parser.add_argument(
-        "--scale-sigma",
-        type=_share,
-        metavar="SHARE",
-        help="standard uncertainty of the scale of the pen, for example 20e-6, if "
-        "the LED file states none",
-    )
-    add_conditions(parser, "--temperature", meaning="for thermal expansion")
+    for each in STATED:
+        described = each.metadata
+        parser.add_argument(
+            f"--{described['option']}",
+            type=_number(described["unit"], *described["range"]),
+            metavar=described["unit"],
+            help=described["help"],
+        )
     parser.add_argument(
         "--temperature-sigma",
         type=number_from(0.001, 50.0, "uncertainty", "K"),
         metavar="K",
         help="standard uncertainty of the temperature (0.5), or without "
         "--temperature the temperature difference from the LED measurement (1.5)",
-    )
-    parser.add_argument(
-        "--form-error",
-        type=number_from(1e-7, 1.0, "uncertainty", "mm"),
-        metavar="MM",
-        help="standard uncertainty due to the form error of ball and cone (0.0002)",
-    )
-    parser.add_argument(
-        "--center-bias",
-        type=number_from(1e-6, 10.0, "uncertainty", "px"),
-        metavar="PX",
-        help="systematic standard uncertainty of LED centres (0.003)",
     )
     parser.add_argument(
         "--method",
@@ -109,14 +99,16 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def _share(text: str) -> float:
-    """Return a fraction, which may be given in per cent."""
-    number = finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    if not SMALLEST_SHARE <= number <= LARGEST_SHARE:
-        raise argparse.ArgumentTypeError(
-            f"{text} is not a share from {SMALLEST_SHARE:g} to {LARGEST_SHARE:.0%}."
-        )
-    return number
+def _number(unit: str, least: float, most: float) -> Callable[[str], float]:
+    """Return a parser of numbers within limits; a share may be given in per cent."""
+    inside = number_from(least, most, "value", "" if unit == SHARE else unit)
+
+    def number_of(text: str) -> float:
+        if unit == SHARE and text.endswith("%"):
+            return inside(f"{finite(text[:-1]) / 100}")
+        return inside(text)
+
+    return number_of
 
 
 def assumptions_of(options: argparse.Namespace) -> Assumptions:
@@ -124,13 +116,10 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
     assumed = USUAL
     if options.camera_sigma is not None:
         assumed = with_focal_length(assumed, options.camera_sigma)
-    temperature = "warmth" if options.temperature is None else "temperature"
     given = {
-        "scale": options.scale_sigma,
-        "temperature_c": options.temperature,
-        "humidity_percent": options.humidity,
-        temperature: options.temperature_sigma,
-        "form_error": options.form_error,
-        "center_bias": options.center_bias,
+        each.name: getattr(options, each.metadata["option"].replace("-", "_"))
+        for each in STATED
     }
+    temperature = "warmth" if options.temperature is None else "temperature"
+    given[temperature] = options.temperature_sigma
     return replace(assumed, **{n: x for n, x in given.items() if x is not None})

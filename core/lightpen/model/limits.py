@@ -211,6 +211,20 @@ def rule_in_words(limits: VerificationLimits) -> Message:
 
 
 COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
+
+
+def _option(
+    default: float | None,
+    name: str,
+    unit: str,
+    between: tuple[float, float],
+    meaning: str,
+) -> Any:
+    """Return an assumption that ``lightpen calibrate`` takes as an option."""
+    described = {"option": name, "unit": unit, "range": between, "help": meaning}
+    return field(default=default, metadata=described)
+
+
 BALL_UNCERTAINTY = 0.001  # mm, U (k = 2) of the diameter of a ball with a certificate
 
 
@@ -267,16 +281,43 @@ class Assumptions:
     k1: float = 0.02
     k2: float = 0.1
     tangential: float = 0.0003
-    scale: float = 1e-5
+    scale: float = _option(
+        1e-5,
+        "scale-sigma",
+        "SHARE",
+        (1e-9, 0.1),
+        "standard uncertainty of the scale of the pen, for example 20e-6, if the LED "
+        "file states none",
+    )
     expansion: float = 2.3e-5
     expansion_share: float = 0.1
-    temperature_c: float | None = None
-    humidity_percent: float | None = None
+    temperature_c: float | None = _option(
+        None,
+        "temperature",
+        "CELSIUS",
+        (COLDEST, WARMEST),
+        "pen temperature, for thermal expansion",
+    )
+    humidity_percent: float | None = _option(
+        None, "humidity", "PERCENT", (0.0, 100.0), "relative humidity, for the record"
+    )
     temperature: float = 0.5
     warmth: float = 1.5  # U (k = 2) of 3 K
     diameter: float = 0.05
-    form_error: float = 0.0002
-    center_bias: float = 0.003
+    form_error: float = _option(
+        0.0002,
+        "form-error",
+        "MM",
+        (1e-7, 1.0),
+        "standard uncertainty due to the form error of ball and cone (0.0002)",
+    )
+    center_bias: float = _option(
+        0.003,
+        "center-bias",
+        "PX",
+        (1e-6, 10.0),
+        "systematic standard uncertainty of LED centres (0.003)",
+    )
     rotation: float = 0.02
     translation: float = 20.0
 
