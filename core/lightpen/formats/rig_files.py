@@ -44,7 +44,7 @@ from lightpen.formats.files import (
     read_text,
     write_whole,
 )
-from lightpen.messages import Message, message, printable
+from lightpen.messages import message, printable
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import LensField
 from lightpen.model.rigid import Rig, nearest_rotation
@@ -93,7 +93,7 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     entries.refuse_others("cameras", "comment")
     listed = _listed_cameras(entries, name)
     names = _names(listed, name)
-    files = tuple(camera_files) or _camera_files(listed, names, path)
+    files = tuple(camera_files) or _camera_files(listed, path)
     if len(files) != len(listed):
         n_cameras, n_files = len(listed), len(files)
         raise FileError(
@@ -163,20 +163,8 @@ def _text(entries: Entries, key: str) -> str:
     return text
 
 
-def _camera_files(
-    listed: list[Entries], names: tuple[str, ...], path: Path
-) -> tuple[Path, ...]:
-    files = tuple(path.parent / _text(each, _INTRINSICS) for each in listed)
-    for c, file in enumerate(files):
-        if file in files[:c]:
-            raise FileError(
-                "rig-file.file-twice",
-                name=printable(path.name),
-                one=names[files.index(file)],
-                other=names[c],
-                file=printable(file.name),
-            )
-    return files
+def _camera_files(listed: list[Entries], path: Path) -> tuple[Path, ...]:
+    return tuple(path.parent / _text(each, _INTRINSICS) for each in listed)
 
 
 def _read_of(rig_name: str, name: str, file: Path) -> Camera:
@@ -206,26 +194,24 @@ def _require_reference(entries: Entries, camera: str, name: str) -> None:
 def _rotation(entries: Entries) -> FloatArray:
     numbers = entries.numbers(_ROTATION)
     if len(numbers) == 4:
-        return _from_quaternion(numbers, entries.name)
+        return _from_quaternion(numbers, entries)
     matrix = entries.counted(9, _ROTATION).reshape(3, 3)
     deviation = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    if not deviation <= ROTATION_TOLERANCE:
-        raise FileError("rig-file.no-rotation", key=_ROTATION, place=entries.name)
-    if np.linalg.det(matrix) < 0:
-        raise FileError("rig-file.mirrored", key=_ROTATION, place=entries.name)
+    if not deviation <= ROTATION_TOLERANCE or np.linalg.det(matrix) < 0:
+        raise _no_rotation(entries)
     return matrix if deviation <= ROUNDING_TOLERANCE else nearest_rotation(matrix)
 
 
-def _from_quaternion(numbers: FloatArray, place: str | Message) -> FloatArray:
-    length = float(np.linalg.norm(numbers))
-    if not abs(length - 1) <= ROTATION_TOLERANCE:
-        raise FileError(
-            "rig-file.quaternion", key=_ROTATION, place=place, length=length
-        )
+def _from_quaternion(numbers: FloatArray, entries: Entries) -> FloatArray:
     from scipy.spatial.transform import Rotation  # takes 0.2 s
 
-    scalar, *vector = numbers.tolist()
-    return np.asarray(Rotation.from_quat([*vector, scalar]).as_matrix())
+    if not abs(np.linalg.norm(numbers) - 1) <= ROTATION_TOLERANCE:
+        raise _no_rotation(entries)
+    return np.asarray(Rotation.from_quat(np.roll(numbers, -1)).as_matrix())
+
+
+def _no_rotation(entries: Entries) -> FileError:
+    return FileError("rig-file.no-rotation", key=_ROTATION, place=entries.name)
 
 
 def _translation(entries: Entries) -> FloatArray:

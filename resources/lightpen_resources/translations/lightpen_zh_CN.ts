@@ -6210,6 +6210,10 @@ needed</source>
         <translation>{name} 中的 {entry} 为 {number:g}；需要 0 或更大的整数。请更正。</translation>
     </message>
     <message>
+        <source>{key} of {place} is no rotation, or a mirrored one: its rows must have the length 1, be at right angles to each other, and right-handed. Give the matrix row by row, or a unit quaternion w x y z.</source>
+        <translation>{place}的 {key} 不是旋转或为镜像：各行的长度必须为 1、两两垂直且构成右手系。请逐行给出矩阵，或给出单位四元数 w x y z。</translation>
+    </message>
+    <message>
         <source>{kind} by {size:.3f} mm before image {image}. Images {begin} to {end} alone are the longer part.</source>
         <translation>{kind} {size:.3f} mm，发生在图像 {image} 之前。较长部分为图像 {begin} 至 {end}。</translation>
     </message>
@@ -6336,10 +6340,6 @@ needed</source>
     <message>
         <source>{name} has the poses of {n_tools} tools: {tools}. State which one is the pen.</source>
         <translation>{name} 含有 {n_tools} 个工具的位姿：{tools}。请指明哪一个是笔。</translation>
-    </message>
-    <message>
-        <source>{name} has the same intrinsics file {file} for {one} and {other}. Give each camera its own calibration file.</source>
-        <translation>{name} 为 {one} 和 {other} 指定了同一个内参文件 {file}。每台相机都需要自己的标定文件。</translation>
     </message>
     <message>
         <source>{name} has the unit {unit}, which is not supported. Use one of {known}.</source>
@@ -6842,20 +6842,8 @@ needed</source>
         <translation>{name} 第 {line} 行重复给出 {key}。请保留正确的一个。</translation>
     </message>
     <message>
-        <source>{key} of {place} is a mirrored rotation (determinant -1). Both cameras need right-handed frames: u right, v down, w forward.</source>
-        <translation>{place}的 {key} 是镜像旋转（行列式为 -1）。两台相机都需要右手坐标系：u 向右，v 向下，w 向前。</translation>
-    </message>
-    <message>
-        <source>{key} of {place} is a quaternion of length {length:.4g}; 1 is needed. Give it as w x y z.</source>
-        <translation>{place}的 {key} 是长度为 {length:.4g} 的四元数；长度应为 1。请按 w x y z 的顺序给出。</translation>
-    </message>
-    <message>
         <source>{key} of {place} is more than {most:g} m. Check its units: millimetres are needed.</source>
         <translation>{place}的 {key} 超过 {most:g} m。请检查其单位：此处需要毫米。</translation>
-    </message>
-    <message>
-        <source>{key} of {place} is no rotation: its rows must have the length 1 and be at right angles to each other. Give the matrix row by row, or a unit quaternion w x y z.</source>
-        <translation>{place}的 {key} 不是旋转：各行的长度必须为 1 且两两垂直。请逐行给出矩阵，或给出单位四元数 w x y z。</translation>
     </message>
     <message>
         <source>{n_images} {reason}</source>

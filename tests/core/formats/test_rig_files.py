@@ -121,10 +121,6 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
     ("edit", "words"),
     [
         (setting("intrinsics", "gone.yaml"), "right: .*gone.yaml does not exist"),
-        (
-            setting("intrinsics", "left.yaml"),
-            "the same intrinsics file .* for left and right",
-        ),
         (setting("intrinsics", [3]), "has no intrinsics"),
         (setting("name", "left"), "two cameras named .left"),
         (setting("name", ""), "camera 2 of rig.json has no name"),
@@ -132,9 +128,9 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         (setting("cam_from_rig_rotation", 9 * [1.0]), "is no rotation"),
         (
             setting("cam_from_rig_rotation", np.diag([1.0, 1.0, -1.0]).tolist()),
-            "mirrored",
+            "is no rotation, or a mirrored one",
         ),
-        (setting("cam_from_rig_rotation", 4 * [1.0]), "quaternion of length 2"),
+        (setting("cam_from_rig_rotation", 4 * [1.0]), "is no rotation"),
         (setting("cam_from_rig_rotation", [1.0, 2.0]), "2 numbers where 9 are needed"),
         (setting("cam_from_rig_translation", [1.0, 2.0]), "2 numbers where 3"),
         (setting("cam_from_rig_translation", 3 * [1e9]), "millimetres are needed"),
