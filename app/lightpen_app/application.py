@@ -9,28 +9,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import FrameType, TracebackType
 from typing import Self
 
-from PySide6.QtCore import (
-    QMessageLogContext,
-    QObject,
-    QTimer,
-    QtMsgType,
-    Signal,
-    qInstallMessageHandler,
-)
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from lightpen.cameras.pairing import MachineClock, SkippingClock
-from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
 from lightpen.live.sources import Simulator, SourceEnvironment
 from lightpen.logs import end_log, log_file, write_log_to
 from lightpen.messages import printable
-from lightpen.record.library.signing import KEYS
 from lightpen_app.crash import CrashHook, versions
 from lightpen_app.face import Service
 from lightpen_app.faced import Face
@@ -44,7 +33,6 @@ from lightpen_app.widgets.controls import open_folder
 from lightpen_app.widgets.page import Page, step_titles
 from lightpen_app.work.job import GarbageCollector, Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
-from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -137,7 +125,6 @@ SWITCH_INTERVAL = 0.0005
 
 SETTLED_MS = 5000  # from the start until all is made and loaded
 
-UNSEEN_FRAME_RATE = 8.0  # 1/s; of an unwatched demo, enough for a swing
 
 _logger = logging.getLogger(__name__)
 
@@ -289,50 +276,7 @@ def run(
         if swing is not None:
             open_swing = partial(wizard.workbench.run.open_requested.emit, swing)
             wizard.started.connect(open_swing)
-        status = _shown(application, wizard, signals)
-    return ended(wizard, status)
-
-
-def run_demo(faces: Sequence[Face], simulator: Simulator | None) -> int:
-    """Play the demo with these extensions, and return the exit status.
-
-    Without a display it is played unseen, in its own time that waits for a machine
-    too slow for it; what happens is printed, and at the end the tip. Settings and
-    records of the user are left alone. Raises `UsageError` without a simulator.
-    """
-    if simulator is None:
-        raise UsageError("application.no-simulator")
-    is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
-    clock = MachineClock() if is_seen else SkippingClock(rests=True)
-    around = SourceEnvironment(simulator, clock)
-    if not is_seen:
-        os.environ["QT_QPA_PLATFORM"] = "offscreen"
-        qInstallMessageHandler(_print_but_hints)
-    application = make_application(sys.argv)
-    with (
-        EndSignals(application) as signals,
-        TemporaryDirectory(prefix="lightpen-demo-") as folder,
-    ):
-        os.environ[KEYS] = str(Path(folder) / "keys")
-        settings = Settings(Path(folder) / "lightpen.json")
-        settings.set_preferences(Settings(settings_file()).preferences())
-        if not is_seen:
-            slow = CameraSettings(frame_rate=UNSEEN_FRAME_RATE)
-            settings.set_camera(simulator.serial, slow)
-        wizard = Wizard(application, faces, settings, Path(folder), around)
-        from lightpen_app.demo import Demo
-
-        demo = Demo(
-            wizard.window, wizard.workbench, wizard.services, is_watched=is_seen
-        )
-        if not is_seen:
-            demo.message_sent.connect(partial(print, flush=True))
-            demo.ended.connect(partial(_print_tip, wizard.workbench.run))
-            demo.ended.connect(wizard.window.close_unasked)
-        wizard.started.connect(demo.start)
-        status = _shown(application, wizard, signals)
-        if not is_seen and not demo.is_accepted:
-            status = status or 1
+        status = shown(application, wizard, signals)
     return ended(wizard, status)
 
 
@@ -344,7 +288,8 @@ def has_display() -> bool:
     return any(os.environ.get(name) for name in names)
 
 
-def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
+def shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
+    """Show the window until it closes; return the exit status."""
     signals.came.connect(lambda: _end(application, wizard))
     wizard.crash_hook.install()
     wizard.show()
@@ -378,19 +323,3 @@ def ended(wizard: Wizard, status: int) -> int:
                 stream.flush()
         os._exit(status)
     return status
-
-
-def _print_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
-    """Forward Qt's messages, except geometry hints of hidden windows."""
-    if "propagateSizeHints" not in text:
-        print(text, file=sys.stderr)
-
-
-def _print_tip(run: SwingRun) -> None:
-    status = run.status
-    if status.solution is not None and status.verdict is not None:
-        from lightpen.estimation.reports.summary import calibration_text
-
-        nominal = status.solution.source.pen.nominal_tip
-        calibration = status.solution.calibration
-        print("\n" + calibration_text(calibration, nominal, status.verdict))

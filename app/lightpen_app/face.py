@@ -14,13 +14,13 @@ from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StatusMessage
-from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
     from lightpen.archive.chains import Event
     from lightpen.record.exports import ExportFormat
     from lightpen.record.swings.solving import Solution
+    from lightpen_app.work.chosen_files import SavePlace
 
 W = TypeVar("W", bound=QWidget)
 
@@ -143,8 +143,6 @@ class Service(QObject):
     verify_step = ""  # key of its page where a tip is verified
     calibrates_cameras = False  # by `calibrate_camera`
     discovers = False  # finds pen and camera without files, by `discover`
-    # Makes what shows reports, for a page.
-    report_printer: Callable[[SavePlace, QWidget], ReportPrinter] | None = None
 
     @property
     def is_here(self) -> bool:
@@ -185,6 +183,10 @@ class Service(QObject):
     def export_formats(self) -> "tuple[ExportFormat, ...]":
         """Return formats in which a calibration can be saved."""
         return ()
+
+    def report_printer(self, place: "SavePlace", page: QWidget) -> ReportPrinter | None:
+        """Make what shows reports, for a page."""
+        return None
 
     def budget_row(self) -> BudgetRow | None:
         """Make a check of the budget."""
@@ -243,11 +245,11 @@ def export_formats(services: Services) -> "tuple[ExportFormat, ...]":
 
 
 def report_printer(
-    services: Services, place: SavePlace, page: QWidget
+    services: Services, place: "SavePlace", page: QWidget
 ) -> ReportPrinter:
     """Return what shows reports for a page."""
-    makers = (each.report_printer for each in services if each.report_printer)
-    return next((make(place, page) for make in makers), ReportPrinter(page))
+    printers = (each.report_printer(place, page) for each in services)
+    return next(filter(None, printers), None) or ReportPrinter(page)
 
 
 def can_discover(services: Services) -> bool:

@@ -25,12 +25,17 @@ class Launchers:
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""
+        from lightpen.errors import UsageError
         from lightpen.formats.decoding import keep_freed_memory
-        from lightpen_app.application import run_demo
         from lightpen_program.extensions import faces, simulator
 
+        simulated = simulator()
+        if simulated is None:
+            raise UsageError("application.no-simulator")
+        from lightpen_app_extensions.simulator.demo import run_demo
+
         keep_freed_memory()
-        return run_demo(faces(), simulator())
+        return run_demo(faces(), simulated)
 
     def test_itself(self, report: Path) -> int:
         """Test the installation and write a report."""

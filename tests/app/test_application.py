@@ -39,7 +39,7 @@ def face(workbench):
     QTimer.singleShot(500, tell)
     return Service(workbench)
 
-sys.exit(run([face]))
+sys.exit(run([face], None))
 """
 
 
@@ -59,11 +59,14 @@ def pages(*given):
     QApplication.quit()
 
 application.make_pages = pages
-sys.exit(application.run(faces()))
+sys.exit(application.run(faces(), None))
 """
 LATER = {
     *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),
-    *("lightpen_app.demo", "lightpen_app_extensions.discover.window"),
+    *(
+        "lightpen_app_extensions.simulator.demo",
+        "lightpen_app_extensions.discover.window",
+    ),
     *(f"lightpen_app.steps.{step}.page" for step in ("camera", "leds", "swing")),
     *(f"lightpen_app.steps.{step}.page" for step in ("review", "history")),
     *("lightpen_app_extensions.measure.verify_page",),

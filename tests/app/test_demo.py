@@ -15,10 +15,10 @@ from pytestqt.qtbot import QtBot
 from tests.verifying import found_by
 
 from lightpen.model.limits import SwingLimits
-from lightpen_app import demo as demo_module
-from lightpen_app.demo import NAMES, Demo
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_app_extensions.simulator import demo as demo_module
+from lightpen_app_extensions.simulator.demo import NAMES, Demo
 from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.simulator.scenes import Scene
@@ -74,7 +74,7 @@ def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
 FAILING = """
 import sys
 from lightpen_program.__main__ import main
-from lightpen_app.demo import Demo
+from lightpen_app_extensions.simulator.demo import Demo
 def has_failed(self):
     state = self._workbench.run.status.state
     return state is not None and state.n_kept > 3

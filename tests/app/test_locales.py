@@ -34,7 +34,7 @@ from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.demo import Demo
+from lightpen_app_extensions.simulator.demo import Demo
 from lightpen_program.extensions import faces
 from lightpen_app.work.settings import Settings
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec import structs
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.errors import ArchiveError
 from lightpen.formats.opened_files import PenFile
 from lightpen.model.limits import Assumptions, DueRule

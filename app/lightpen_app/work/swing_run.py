@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from PySide6.QtCore import QObject, Qt, Signal
 from typing_extensions import override
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.live.sources import Follower
 from lightpen.messages import Message
 from lightpen.record.results.result_folder import RECORDS, FolderArchive

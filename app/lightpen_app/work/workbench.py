@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import Message
 from lightpen.record.folder import check_writable, sweep_leftovers

@@ -5,7 +5,7 @@ from lightpen_extensions.boards.extension import BOARDS as CORE
 
 
 def _load() -> "Face":
-    from lightpen_app_extensions.boards.window import BoardsService
+    from lightpen_app_extensions.boards.service import BoardsService
 
     return BoardsService
 

@@ -1,6 +1,5 @@
 """The window of a camera calibration, shown on demand."""
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -11,8 +10,6 @@ from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
-from lightpen.record.folder import CalibratedCamera
-from lightpen_app.face import WindowService
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.bars import JobProgress
@@ -303,25 +300,3 @@ def _residuals(found: CameraCalibration) -> BoardOverlay:
     pixels, residuals = found.views.pixels[:, 0][seen], found.adjustment.residuals[:, 0]
     arrows = np.concatenate([pixels, residuals[seen]], axis=1)
     return BoardOverlay(arrows=arrows)
-
-
-class BoardsService(WindowService["BoardWindow"]):
-    """Calibrates a camera by views of a board, in a window of its own."""
-
-    calibrates_cameras = True
-
-    @override
-    def calibrate_camera(self, page: QWidget, on_saved: Callable[[str], None]) -> None:
-        def make() -> "BoardWindow":
-            # A camera is calibrated once a year; it is not waited for at each start.
-
-            window = BoardWindow(self._workbench.live, self._workbench.save_place, page)
-            window.saved.connect(on_saved)
-            window.concluded.connect(self._on_concluded)
-            return window
-
-        self._show_window(make)
-
-    def _on_concluded(self, camera: CalibratedCamera) -> None:
-        names = self._workbench.selection.preparation.names
-        self._workbench.archive_writer.keep_camera_calibration(camera, names)

@@ -5,7 +5,7 @@ from lightpen_extensions.discover.extension import DISCOVER as CORE
 
 
 def _load() -> "Face":
-    from lightpen_app_extensions.discover.window import DiscoverService
+    from lightpen_app_extensions.discover.service import DiscoverService
 
     return DiscoverService
 

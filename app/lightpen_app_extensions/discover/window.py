@@ -8,7 +8,6 @@ from typing_extensions import override
 
 from lightpen.model.pen import DISC_DIAMETER
 from lightpen.model.uncertainty_map import map_uncertainty
-from lightpen_app.face import WindowService
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import (
     fill,
@@ -318,21 +317,3 @@ def _longest_pair(found: Discovery | None) -> tuple[int, ...]:
     if found is None:
         return ()
     return found.lengths[0].first + 1, found.lengths[0].second + 1
-
-
-class DiscoverService(WindowService["DiscoveryWindow"]):
-    """Finds tip, pen and camera by one swing, in a window of its own."""
-
-    discovers = True
-
-    @override
-    def discover(self, window: QWidget, *, is_camera_known: bool) -> None:
-        def make() -> "DiscoveryWindow":
-            # It takes long to be imported, and is seldom wanted.
-            from lightpen_app_extensions.discover import window as discovery_window
-
-            made = discovery_window.DiscoveryWindow(self._workbench, window)
-            made.continued.connect(lambda: self.step_requested.emit("swing"))
-            return made
-
-        self._show_window(make).set_camera_known(is_camera_known)

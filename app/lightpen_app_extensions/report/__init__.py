@@ -5,7 +5,7 @@ from lightpen_app.faced import Face, Faced
 
 
 def _load() -> "Face":
-    from lightpen_app_extensions.report.control import ReportService
+    from lightpen_app_extensions.report.service import ReportService
 
     return ReportService
 

@@ -33,7 +33,7 @@ from lightpen.record.folder import (
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.swings.header import Names
-from lightpen_app.face import ReportPrinter, Service
+from lightpen_app.face import ReportPrinter
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.bars import JobProgress
@@ -155,12 +155,6 @@ class PrintReportControl(ReportPrinter):
         window.saved.connect(self.saved)
         window.failed.connect(self.failed)
         window.show()
-
-
-class ReportService(Service):
-    """Shows reports for the steps Review and History."""
-
-    report_printer = PrintReportControl
 
 
 class PrintReportWindow(FittedWindow, Translated, QWidget):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.local_time import local_now

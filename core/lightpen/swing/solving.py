@@ -5,7 +5,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import TypeVar
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.detection.reasons import Reason
 from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.reports.verdict import Grade

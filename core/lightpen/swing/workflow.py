@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError

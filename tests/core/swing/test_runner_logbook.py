@@ -10,7 +10,8 @@ from tests.core.conftest import TIMEOUT, Station
 
 from lightpen.archive.chains import Event, Kind, chain_names, entries_of
 from lightpen.archive.checks import check_archive
-from lightpen.archive.logbook import LazyLogbook, Logbook
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import look_into
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.interrupted import discard_swing

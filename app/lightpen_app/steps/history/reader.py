@@ -19,7 +19,8 @@ from lightpen.archive.history import (
     messages_on,
     n_wanted,
 )
-from lightpen.archive.logbook import LazyLogbook, ReplicationState
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import ReplicationState
 from lightpen.comparisons.repeatability import trend_of
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library

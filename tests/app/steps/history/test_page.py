@@ -31,7 +31,7 @@ from typing_extensions import override
 from lightpen.archive.chains import Event, Kind
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
 from lightpen.archive.growth import append
-from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.store import Database
 from lightpen.comparisons.assessment import (
     USE_TIP,
@@ -73,7 +73,8 @@ from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.report.control import PrintReportWindow, ReportService
+from lightpen_app_extensions.report.control import PrintReportWindow
+from lightpen_app_extensions.report.service import ReportService
 from lightpen_extensions.plant.server import Replicator
 from lightpen_resources import languages
 

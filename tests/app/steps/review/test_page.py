@@ -86,7 +86,8 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
 from lightpen_app_extensions.comparisons.service import ComparisonsService
 from lightpen_app_extensions.exports.service import ExportsService
-from lightpen_app_extensions.report.control import PrintReportWindow, ReportService
+from lightpen_app_extensions.report.control import PrintReportWindow
+from lightpen_app_extensions.report.service import ReportService
 from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.scene_files import write_sample_files

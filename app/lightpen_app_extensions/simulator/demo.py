@@ -1,18 +1,45 @@
 """The demo: a simulated operator uses the whole wizard."""
 
+import os
+import sys
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import (
+    QMessageLogContext,
+    QObject,
+    QTimer,
+    QtMsgType,
+    Signal,
+    qInstallMessageHandler,
+)
 
+from lightpen.cameras.pairing import MachineClock, SkippingClock
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.live.sources import Simulator, SourceEnvironment
+from lightpen.record.library.signing import KEYS
 from lightpen.record.swings.header import Names
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.preparation import SourceChoice
+from lightpen_app.application import (
+    EndSignals,
+    Wizard,
+    ended,
+    has_display,
+    make_application,
+    shown,
+)
 from lightpen_app.face import DemoStep, Service
+from lightpen_app.faced import Face
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.work.settings import Settings, settings_file
+from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
 NAMES = Names(
@@ -21,6 +48,7 @@ NAMES = Names(
 )  # fmt: skip
 TICK_MS = 100
 WATCHED_S, UNWATCHED_S = 5.0, 0.1  # spent on each page, s
+UNSEEN_FRAME_RATE = 8.0  # 1/s; of an unwatched demo, enough for a swing
 LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 
 
@@ -152,3 +180,58 @@ class Demo(QObject):
         self._timer.stop()
         self.ended.emit()
         self.message_sent.emit(words)
+
+
+def run_demo(faces: Sequence[Face], simulator: Simulator) -> int:
+    """Play the demo with these extensions, and return the exit status.
+
+    Without a display it is played unseen, in its own time that waits for a machine
+    too slow for it; what happens is printed, and at the end the tip. Settings and
+    records of the user are left alone.
+    """
+    is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
+    clock = MachineClock() if is_seen else SkippingClock(rests=True)
+    around = SourceEnvironment(simulator, clock)
+    if not is_seen:
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        qInstallMessageHandler(_print_but_hints)
+    application = make_application(sys.argv)
+    with (
+        EndSignals(application) as signals,
+        TemporaryDirectory(prefix="lightpen-demo-") as folder,
+    ):
+        os.environ[KEYS] = str(Path(folder) / "keys")
+        settings = Settings(Path(folder) / "lightpen.json")
+        settings.set_preferences(Settings(settings_file()).preferences())
+        if not is_seen:
+            slow = CameraSettings(frame_rate=UNSEEN_FRAME_RATE)
+            settings.set_camera(simulator.serial, slow)
+        wizard = Wizard(application, faces, settings, Path(folder), around)
+        demo = Demo(
+            wizard.window, wizard.workbench, wizard.services, is_watched=is_seen
+        )
+        if not is_seen:
+            demo.message_sent.connect(partial(print, flush=True))
+            demo.ended.connect(partial(_print_tip, wizard.workbench.run))
+            demo.ended.connect(wizard.window.close_unasked)
+        wizard.started.connect(demo.start)
+        status = shown(application, wizard, signals)
+        if not is_seen and not demo.is_accepted:
+            status = status or 1
+    return ended(wizard, status)
+
+
+def _print_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+    """Forward Qt's messages, except geometry hints of hidden windows."""
+    if "propagateSizeHints" not in text:
+        print(text, file=sys.stderr)
+
+
+def _print_tip(run: SwingRun) -> None:
+    status = run.status
+    if status.solution is not None and status.verdict is not None:
+        from lightpen.estimation.reports.summary import calibration_text
+
+        nominal = status.solution.source.pen.nominal_tip
+        calibration = status.solution.calibration
+        print("\n" + calibration_text(calibration, nominal, status.verdict))

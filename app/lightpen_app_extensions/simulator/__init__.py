@@ -1,0 +1,1 @@
+"""The demo, in which a simulated operator uses the window."""
