@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.look.words import PARTED, TimeLeft, set_tooltip
+from lightpen_app.look.words import PARTED, TimeLeft
 from lightpen_app.widgets.controls import ENTER_KEYS, PushButton, give_focus
 from lightpen_app.widgets.fields import EnterEdit, SupervisorFields, Translated
 
@@ -367,14 +367,6 @@ class JobProgress(Translated, QWidget):
             self.begin()
         elif not is_running:
             self.end()
-
-    def take_focus(self) -> None:
-        """Give the focus to Cancel."""
-        self._cancel.setFocus()
-
-    def set_cancel_tooltip(self, text: str) -> None:
-        """Say what stays when the job is cancelled."""
-        set_tooltip(self._cancel, text)
 
     def _on_cancel_clicked(self) -> None:
         self.end()

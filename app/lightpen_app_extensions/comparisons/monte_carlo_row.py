@@ -110,7 +110,6 @@ class MonteCarloRow(Translated, BudgetRow):
             crashed=self._on_cancel_clicked,
         )
         self._refresh()
-        self._progress.take_focus()
 
     def _on_found(self, found: MonteCarlo) -> None:
         self._found = found

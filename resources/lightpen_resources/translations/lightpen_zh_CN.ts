@@ -153,33 +153,6 @@
     </message>
 </context>
 <context>
-    <name>AssumptionsPanel</name>
-    <message>
-        <source>Default uncertainties</source>
-        <translation>默认不确定度</translation>
-    </message>
-    <message>
-        <source>Default values are used where a file states no uncertainty.</source>
-        <translation>文件未给出不确定度时采用默认值。</translation>
-    </message>
-    <message>
-        <source>Values of this station are used where a file states no uncertainty.</source>
-        <translation>文件未给出不确定度时采用本工位设定值。</translation>
-    </message>
-    <message>
-        <source>Change</source>
-        <translation>更改</translation>
-    </message>
-    <message>
-        <source>Change the default uncertainties</source>
-        <translation>更改默认不确定度</translation>
-    </message>
-    <message>
-        <source>Focal length, scale, temperature, form of ball and cone: uncertainty where no file states it.</source>
-        <translation>焦距、尺度、温度、测球与锥孔形状：文件未给出时的不确定度。</translation>
-    </message>
-</context>
-<context>
     <name>BoardCalibration</name>
     <message>
         <source>Camera calibrated.</source>
@@ -3640,10 +3613,6 @@ needed</source>
         <translation>详细信息</translation>
     </message>
     <message>
-        <source>Keep last solution</source>
-        <translation>保留上次的解</translation>
-    </message>
-    <message>
         <source>Repeat swing</source>
         <translation>重新摆动</translation>
     </message>
@@ -3906,6 +3875,14 @@ needed</source>
     <message>
         <source>More</source>
         <translation>更多</translation>
+    </message>
+    <message>
+        <source>Default uncertainties...</source>
+        <translation>默认不确定度...</translation>
+    </message>
+    <message>
+        <source>Focal length, scale, temperature, form of ball and cone: uncertainty where no file states it.</source>
+        <translation>焦距、尺度、温度、测球与锥孔形状：文件未给出时的不确定度。</translation>
     </message>
     <message>
         <source>Show the tips of this station</source>

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from math import hypot
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
-from typing_extensions import override
 
 from lightpen.cameras.protocol import Connection, Stats
 from lightpen.detection.reasons import Reason
@@ -48,12 +46,8 @@ class LivePanel(Translated, QWidget):
         # Widgets
         self._switch = CameraSwitch()
         self._state = SignLabel(wraps=False)
-        self._parts: tuple[str, ...] = ()  # the most important first
         self._figures = text_label(TextSize.SMALL, Tone.QUIET)
         self._figures.setWordWrap(False)
-        self._figures.setAlignment(
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        )
         self._figures.setSizePolicy(
             QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
         )
@@ -84,7 +78,7 @@ class LivePanel(Translated, QWidget):
         self._switch.set_value(shown)
 
     def figures(self) -> str:
-        """Return the number of spots and the frame rate, shortened to the width."""
+        """Return the number of spots, the frame rate and the size of the image."""
         return self._figures.text()
 
     def set_image(self, shown: DisplayedImage, stats: Stats) -> None:
@@ -124,22 +118,7 @@ class LivePanel(Translated, QWidget):
         self._seen = None
         self._arrivals.clear()
         self._n_lost.clear()
-        self._parts = ()
-        self._fit_figures()
-
-    @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit_figures()
-
-    def _fit_figures(self) -> None:
-        """Show as much as there is room for; all of it is in the tool tip."""
-        parts, metrics = self._parts, self._figures.fontMetrics()
-        room = self.width() - self._state.sizeHint().width() - HEAD_GAP
-        while len(parts) > 1 and metrics.horizontalAdvance(PARTED.join(parts)) > room:
-            parts = parts[:-1]
-        self._figures.setText(PARTED.join(parts))
-        set_tooltip(self._figures, PARTED.join(self._parts))
+        self._figures.clear()
 
     def _retranslate(self) -> None:
         self._refresh()
@@ -195,8 +174,9 @@ class LivePanel(Translated, QWidget):
         if n_lost > 0:
             parts.append(self.tr("Lost: {0}").format(n_lost))
         parts.append(self.tr("{0} x {1} px").format(width, height))
-        self._parts = tuple(parts)
-        self._fit_figures()
+        words = PARTED.join(parts)  # the most important first; the rest may be clipped
+        self._figures.setText(words)
+        set_tooltip(self._figures, words)
 
     def _leds_text(self, seen: LiveImage) -> str:
         detection = seen.detection

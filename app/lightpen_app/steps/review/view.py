@@ -243,7 +243,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             self.tr("Uncertainty"),
             self.tr("Two-stage"),
         )
-        self.solving.set_cancel_tooltip(self.tr("Keep last solution"))
         self.reason.set_words(
             self.tr("This result needs checking. Enter the reason for accepting it."),
             self.tr("Reason"),

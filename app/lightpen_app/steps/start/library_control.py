@@ -17,7 +17,7 @@ from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.fields import ItemChoice
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog, RequestedChange
-from lightpen_app.steps.start.limits_dialog import AssumptionsPanel
+from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.bars import Question, QuestionBar
 from lightpen_app.widgets.state_banner import status_message
 from lightpen_app.work.selection import Selection
@@ -167,7 +167,7 @@ class EntryPresenter(QObject):
         library: LibraryControl,
         names: NamesForm,
         limits: LimitsForm,
-        assumed: AssumptionsPanel,
+        assumed: AssumptionsDialog,
     ) -> None:
         super().__init__(names)
         self._selection, self._library = selection, library

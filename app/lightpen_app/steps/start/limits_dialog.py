@@ -4,14 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QGroupBox,
-    QLabel,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.limits import (
@@ -30,15 +23,9 @@ from lightpen.record.library.supervision import (
     read_supervision,
     save_limits,
 )
-from lightpen_app.look.layouts import (
-    fill,
-    grid_layout,
-    horizontal_layout,
-    vertical_layout,
-)
+from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import phrases_whole
-from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import (
     ChoiceField,
     SupervisorFields,
@@ -394,57 +381,3 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
         is_measured = self._value.temperature_c is not None
         self._fields["temperature"].setEnabled(is_measured)
         self._fields["warmth"].setEnabled(not is_measured)
-
-
-class AssumptionsPanel(Translated, QGroupBox):
-    """Opens the default uncertainties of a station."""
-
-    value_changed = Signal()  # the user chose other assumptions
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.say(self, self.tr("Default uncertainties"))
-
-        # Widgets
-        self._words = text_label(TextSize.SMALL, Tone.QUIET)
-        self._change = self.say(
-            PushButton(),
-            self.tr("Change"),
-            name=self.tr("Change the default uncertainties"),
-            tip=self.tr(
-                "Focal length, scale, temperature, form of ball and cone: "
-                "uncertainty where no file states it."
-            ),
-        )
-        self.dialog = AssumptionsDialog(self)
-
-        # Layout
-        horizontal_layout(self, (self._words, 1), self._change, spacing=2 * GRID)
-
-        # Connections
-        self._change.clicked.connect(self.dialog.open)
-        self.dialog.value_changed.connect(self._on_dialog_changed)
-
-        self._retranslate()
-
-    def value(self) -> Assumptions:
-        """Return the assumptions."""
-        return self.dialog.value()
-
-    def set_value(self, assumptions: Assumptions) -> None:
-        """Show other assumptions."""
-        self.dialog.set_value(assumptions)
-        self._retranslate()
-
-    def _on_dialog_changed(self) -> None:
-        self._retranslate()
-        self.value_changed.emit()
-
-    def _retranslate(self) -> None:
-        self._words.setText(
-            self.tr("Default values are used where a file states no uncertainty.")
-            if self.value() == USUAL
-            else self.tr(
-                "Values of this station are used where a file states no uncertainty."
-            )
-        )

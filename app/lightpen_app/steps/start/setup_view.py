@@ -23,7 +23,7 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import breakable
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
-from lightpen_app.steps.start.limits_dialog import AssumptionsPanel
+from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.controls import PushButton, open_folder
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.pen_in_space import (
@@ -107,7 +107,15 @@ class SetupView(Translated, QWidget):
 
         # Widgets: the order of making them is the order of the Tab key
         self.names, self.limits = NamesForm(), LimitsForm()
-        self.assumed = AssumptionsPanel()
+        self.assumed = AssumptionsDialog(self)
+        self._assumptions = self.make_button(
+            self.tr("Default uncertainties..."),
+            self.assumed.open,
+            tip=self.tr(
+                "Focal length, scale, temperature, form of ball and cone: "
+                "uncertainty where no file states it."
+            ),
+        )
         self.folder = DataFolderPanel(workbench.folder, workbench.notifications)
         self._more = self.say(PushButton(checkable=True), self.tr("More"))
         self._done = self.make_button(
@@ -125,7 +133,7 @@ class SetupView(Translated, QWidget):
             self.names,
             (self._more, 0, Qt.AlignmentFlag.AlignLeft),
             self.limits,
-            self.assumed,
+            (self._assumptions, 0, Qt.AlignmentFlag.AlignLeft),
             1,
             spacing=2 * GRID,
             stretch=5,
@@ -153,7 +161,7 @@ class SetupView(Translated, QWidget):
         """Show also what has a default."""
         self._more.setChecked(more)
         self.names.set_more(more)
-        for each in (self.limits, self.assumed, self.folder):
+        for each in (self.limits, self._assumptions, self.folder):
             each.setVisible(more)
 
     def set_why_not_done(self, why_not: str) -> None:

@@ -8,7 +8,7 @@ from pytestqt.qtbot import QtBot
 from tests.app.typed_numbers import type_number
 
 from lightpen.model.limits import USUAL
-from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, AssumptionsPanel
+from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.number_field import NumberField
 
 
@@ -63,11 +63,3 @@ def test_the_usual_values_come_back(dialog: AssumptionsDialog) -> None:
     assert isinstance(buttons, QDialogButtonBox)
     buttons.button(QDialogButtonBox.StandardButton.RestoreDefaults).click()
     assert dialog.value() == USUAL
-
-
-def test_the_panel_tells_whether_a_station_has_its_own(qtbot: QtBot) -> None:
-    panel = AssumptionsPanel()
-    qtbot.addWidget(panel)
-    with qtbot.waitSignal(panel.value_changed):
-        type_number(field(panel.dialog, "Scale"), 20.0)
-    assert panel.value() == replace(USUAL, scale=20e-6)
