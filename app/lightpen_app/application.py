@@ -280,6 +280,13 @@ def run(
     return ended(wizard, status)
 
 
+def required(simulator: Simulator | None) -> Simulator:
+    """Return the simulator; raises `UsageError` without one."""
+    if simulator is None:
+        raise UsageError("application.no-simulator")
+    return simulator
+
+
 def has_display() -> bool:
     """Return whether a window can be shown, or a platform without one is chosen."""
     if not sys.platform.startswith("linux"):

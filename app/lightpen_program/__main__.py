@@ -25,13 +25,11 @@ class Launchers:
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""
-        from lightpen.errors import UsageError
         from lightpen.formats.decoding import keep_freed_memory
+        from lightpen_app.application import required
         from lightpen_program.extensions import faces, simulator
 
-        simulated = simulator()
-        if simulated is None:
-            raise UsageError("application.no-simulator")
+        simulated = required(simulator())
         from lightpen_app_extensions.simulator.demo import run_demo
 
         keep_freed_memory()

@@ -347,3 +347,18 @@ WorkerEvent: TypeAlias = (
     | Failed
     | WorkerStopped
 )
+
+
+def not_found(place: str, why: str = "") -> DeviceNotFound:
+    """Return the error of a camera that was not found."""
+    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")
+
+
+def busy(place: str) -> DeviceBusy:
+    """Return the error of a camera in use by another program."""
+    return DeviceBusy("camera.busy", place=place)
+
+
+def lost(serial: str, why: str) -> DeviceLost:
+    """Return the error of a camera that no longer responds."""
+    return DeviceLost("camera.lost", serial=serial, why=why)

@@ -136,4 +136,7 @@ MESSAGES = {
     "verdict.file-assumed": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.",
     "swing.images-stay-in": "Without these images the tip is not determined; they remain included. {why}",
     "swing.bug": "An internal error occurred. The captured images are saved. Continue, or restart the program.",
+    "camera.not-found": "There is no camera {place}{why}. Check its power, its cable and its address, then search again.",
+    "camera.busy": "Another program uses the camera {place}. Close that program, or wait a few seconds if it has just ended.",
+    "camera.lost": "Camera {serial} no longer responds ({why}). Check cable and power.",
 }

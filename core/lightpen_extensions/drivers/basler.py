@@ -10,16 +10,13 @@ from typing import Any
 import numpy as np
 
 from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.protocol import DeviceNotFound, busy, lost, not_found
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import Message, message
 from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
-    busy,
     in_sentences,
-    lost,
-    not_found,
 )
 from lightpen_extensions.drivers.genicam import GenapiFeatures, refusals
 

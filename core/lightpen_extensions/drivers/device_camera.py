@@ -18,14 +18,12 @@ from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
     ConfigError,
-    DeviceBusy,
-    DeviceLost,
-    DeviceNotFound,
     Frame,
     FrameIncomplete,
     FrameTimeout,
     Stats,
     TriggerMode,
+    lost,
     sealed,
 )
 from lightpen.messages import Message
@@ -290,21 +288,6 @@ class DeviceCamera:
             pixel_format=pixel_format.name,
             full_scale=pixel_format.full_scale,
         )
-
-
-def not_found(place: str, why: str = "") -> DeviceNotFound:
-    """Return the error of a camera that was not found."""
-    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")
-
-
-def busy(place: str) -> DeviceBusy:
-    """Return the error of a camera in use by another program."""
-    return DeviceBusy("camera.busy", place=place)
-
-
-def lost(serial: str, why: str) -> DeviceLost:
-    """Return the error of a camera that no longer responds."""
-    return DeviceLost("camera.lost", serial=serial, why=why)
 
 
 def setting_refused(serial: str, why: str) -> ConfigError:

@@ -274,8 +274,9 @@ def test_the_trace_tells_every_estimate(whole: Station) -> None:
     assert len(trace.n_images) == whole.state.n_kept
     np.testing.assert_allclose(trace.uncertainties[-1], whole.state.kept.uncertainty)
     late = trace.uncertainties[-50:]
-    # What the seat is off by is estimated anew with each image, so U may rise a little.
-    assert (np.diff(late) < 0.1 * late[:-1]).all()
+    # What seat, lens and pen are off by is estimated anew with each image, so U may rise
+    # in between.
+    assert (late[-1] < late[0]).all()
 
 
 def test_the_countdown_counts_three_two_one() -> None:
