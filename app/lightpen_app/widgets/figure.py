@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from PySide6.QtCore import QEvent, QSize, Signal
+from PySide6.QtCore import QEvent, QSize
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -26,8 +26,6 @@ class Axes:
 class Figure(QWidget):
     """Base of the figures: their words and numbers."""
 
-    titled = Signal()  # title or labels changed
-
     def __init__(self) -> None:
         super().__init__()
         self._columns: dict[str, Column] = {}
@@ -38,7 +36,6 @@ class Figure(QWidget):
         self._axes = axes
         self.setAccessibleName(axes.title)
         self._restyle()
-        self.titled.emit()
 
     @override
     def changeEvent(self, event: QEvent) -> None:

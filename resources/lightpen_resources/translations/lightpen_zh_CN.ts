@@ -3009,13 +3009,6 @@
     </message>
 </context>
 <context>
-    <name>PlotCard</name>
-    <message>
-        <source>Enlarge this plot</source>
-        <translation>放大此图</translation>
-    </message>
-</context>
-<context>
     <name>PointField</name>
     <message>
         <source>As in the LED file</source>

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetricsF, QImage, QPainter
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QToolButton
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from tests.app.pictures import colors_in
 
@@ -17,7 +17,6 @@ from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.figures import arrow_scale, budget_figure
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, LIGHT, TextSize, apply_theme, font
-from lightpen_app.steps.review.plot_cards import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.swing.view import SwingPlots
 from lightpen_app.widgets.figure import Axes, Figure
@@ -325,20 +324,6 @@ def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
         lines.set_data(np.arange(float(n)), np.ones(n))
 
     assert (bars.n_items(), lines.n_items()) == before
-
-
-def test_one_plot_is_enlarged_over_its_neighbours(qtbot: QtBot) -> None:
-    cards = [PlotCard(PosturePlot(Axes(name))) for name in "abc"]
-    grid = PlotGrid(cards)
-    qtbot.addWidget(grid)
-    grid.resize(600, 400)
-    grid.show()
-
-    cards[1].findChildren(QToolButton)[0].click()
-    assert [card.isVisible() for card in cards] == [False, True, False]
-
-    QTest.mouseDClick(cards[1], Qt.MouseButton.LeftButton)
-    assert [card.isVisible() for card in cards] == [True, True, True]
 
 
 def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:

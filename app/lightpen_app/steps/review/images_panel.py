@@ -100,7 +100,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._table.selection_changed.connect(self._refresh_buttons)
         self._switch.value_changed.connect(self._on_choice_changed)
         self._misfits.number_chosen.connect(self._table.choose)
-        self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._shortcut(QKeySequence.StandardKey.Delete, self._exclude.click)
         self._shortcut(Qt.Key.Key_Insert, self._include.click)
 
@@ -298,24 +297,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._view.clear()
         self._view.set_message("")
         self._view.set_arrows(NO_ARROWS)
-
-    def _on_enlarge_toggled(self, enlarged: bool) -> None:
-        """Enlarge the plot to the whole panel, or restore it."""
-        for widget in (
-            self._table,
-            self._count,
-            self._exclude,
-            self._include,
-            self._view,
-            self._caption,
-        ):
-            widget.setVisible(not enlarged)
-        self._switch.setVisible(not enlarged and self._is_of_rig())
-        self._grid.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
-        if self._room.is_narrow:
-            self._grid.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
-        else:
-            self._grid.setColumnStretch(1, 0 if enlarged else 1)
 
     def _on_exclude_clicked(self) -> None:
         rows = self._table.selected()

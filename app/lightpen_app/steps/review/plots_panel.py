@@ -19,10 +19,15 @@ from lightpen.record.swings.solving import Solution
 from lightpen.swing.status import FailedSwing
 from lightpen_app.face import Services
 from lightpen_app.look.figures import budget_figure
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, set_tooltip
-from lightpen_app.steps.review.plot_cards import PlotCard, PlotGrid
+from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.live_markers import CameraSwitch
@@ -35,6 +40,9 @@ from lightpen_app.widgets.result_plots import (
 )
 from lightpen_app.widgets.tables import Figures, NumberTable
 
+N_COLUMNS = 2  # of plots
+LEAST_HEIGHT = 25 * GRID  # px, of a plot with its title and axes
+
 
 class PlotsPanel(Translated, QWidget):
     """Base of the panels: shows plots of a solution."""
@@ -44,11 +52,14 @@ class PlotsPanel(Translated, QWidget):
         self._solution: Solution | None = None
         self._limit: float | None = None  # of U, mm
 
-        # Widgets
-        self._grid = PlotGrid(cards)
+        self._cards = tuple(cards)
 
         # Layout
-        self._layout = vertical_layout(self, (self._grid, 1), margins=(0, GRID, 0, 0))
+        self._layout = vertical_layout(self, margins=(0, GRID, 0, 0))
+        grid = grid_layout(self._layout, stretch=1)
+        for i, card in enumerate(self._cards):
+            card.plot.setMinimumHeight(LEAST_HEIGHT)
+            grid.addWidget(card, *divmod(i, N_COLUMNS))
 
     def value(self) -> Solution | None:
         """Return the solution that is shown."""
@@ -65,7 +76,7 @@ class PlotsPanel(Translated, QWidget):
 
     def cards(self) -> Sequence[PlotCard]:
         """Return the plots with their menus."""
-        return self._grid.cards()
+        return self._cards
 
     def shut_down(self) -> None:
         """Cancel running jobs."""
@@ -87,7 +98,7 @@ class ResidualsPanel(PlotsPanel):
             [PlotCard(self._arrows), PlotCard(self._leds), PlotCard(self._lens)]
         )
         self._lens_card = self.cards()[-1]
-        self._lens_card.set_needed(False)
+        self._lens_card.setVisible(False)
         self._advice = self.say(
             text_label(TextSize.SMALL, Tone.QUIET),
             self.tr(
@@ -142,7 +153,7 @@ class ResidualsPanel(PlotsPanel):
         residuals = solution.residuals[:, c][used]
         leds = calibration.leds
         shifts = calibration.bundle.lens_shifts(c)
-        self._lens_card.set_needed(shifts is not None)
+        self._lens_card.setVisible(shifts is not None)
         if shifts is not None:
             in_joint: BoolArray = np.any(calibration.joint.used, axis=1)
             in_fit = images.leds_used[calibration.used]

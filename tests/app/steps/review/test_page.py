@@ -27,7 +27,6 @@ from PySide6.QtWidgets import (
     QPushButton,
     QTabBar,
     QTabWidget,
-    QToolButton,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -1101,25 +1100,6 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
 
 
 # Plots
-
-
-def test_the_plot_beside_the_images_is_enlarged_over_all_about_it(
-    page: ReviewPage,
-) -> None:
-    panel = the(page, ImagesPanel)
-    card = the(panel, PlotCard)
-    before = card.width()
-    (enlarge,) = card.findChildren(QToolButton)
-
-    enlarge.click()
-    QApplication.processEvents()
-    assert card.width() > 1.5 * before
-    assert not the(panel, ImageTable).isVisible()
-
-    enlarge.click()
-    QApplication.processEvents()
-    assert card.width() == before
-    assert the(panel, ImageTable).isVisible()
 
 
 @pytest.mark.slow
