@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import hypot
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.cameras.protocol import Connection, Stats
 from lightpen.detection.reasons import Reason
@@ -15,7 +15,7 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.words import PARTED, set_tooltip
+from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import CameraSwitch, led_numbers, live_markers
@@ -47,10 +47,6 @@ class LivePanel(Translated, QWidget):
         self._switch = CameraSwitch()
         self._state = SignLabel(wraps=False)
         self._figures = text_label(TextSize.SMALL, Tone.QUIET)
-        self._figures.setWordWrap(False)
-        self._figures.setSizePolicy(
-            QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
-        )
         self.view = self.say(
             ImageView(),
             tip=self.tr(
@@ -174,9 +170,7 @@ class LivePanel(Translated, QWidget):
         if n_lost > 0:
             parts.append(self.tr("Lost: {0}").format(n_lost))
         parts.append(self.tr("{0} x {1} px").format(width, height))
-        words = PARTED.join(parts)  # the most important first; the rest may be clipped
-        self._figures.setText(words)
-        set_tooltip(self._figures, words)
+        self._figures.setText(PARTED.join(parts))
 
     def _leds_text(self, seen: LiveImage) -> str:
         detection = seen.detection

@@ -53,6 +53,7 @@ from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel
+from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
@@ -594,16 +595,18 @@ def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
     accepted(workbench, timedelta(days=12))
     page = show(workbench).page
 
-    def letters(text: str) -> int:
+    def letters() -> tuple[int, int]:
         labels = page.findChildren(QLabel)
-        (label,) = (label for label in labels if label.text() == text)
-        label.ensurePolished()
-        return label.fontInfo().pixelSize()
+        (age,) = (label for label in labels if label.text() == "12 days ago")
+        (table,) = page.findChildren(NumberTable)
+        age.ensurePolished()
+        table.ensurePolished()
+        return age.fontInfo().pixelSize(), table.fontInfo().pixelSize()
 
     page.resize(1000, 640)
-    small = letters("12 days ago"), letters("-1.3182")
+    small = letters()
     page.resize(1616, 870)
-    large = letters("12 days ago"), letters("-1.3182")
+    large = letters()
 
     assert small == (TextSize.TITLE, TextSize.BODY)
     assert large == (TextSize.DISPLAY, TextSize.TITLE)
