@@ -1,4 +1,4 @@
-"""Plots with replaceable data.
+"""Plots with replaceable data, which can be saved as PNG and CSV.
 
 Making a plot again costs fifty times more than `setData` on one that is there.
 """
@@ -124,6 +124,9 @@ SYMBOLS = {
     "t1": "\N{BLACK UP-POINTING TRIANGLE}",
 }
 SYMBOL = 7  # px
+N_MARKED = 12  # points of a curve
+FENCE = 1.5  # quartile distances, beyond which a value is an outlier (Tukey)
+NEWEST = 0.25  # of the values, which are in sight whatever they are
 
 pg.setConfigOptions(antialias=True)
 
@@ -300,6 +303,8 @@ class TracePlot(Plot):
         Always show the zero.
     y_log : bool
         Show values over decades; those that are not above zero leave a gap.
+    is_robust : bool
+        Cut off outliers among the earlier values.
     """
 
     def __init__(
@@ -309,14 +314,18 @@ class TracePlot(Plot):
         *,
         y_zero: bool = False,
         y_log: bool = False,
+        is_robust: bool = False,
     ) -> None:
+        self.has_symbols = len(curves) == len(SYMBOLS)
         self._curves: list[pg.PlotCurveItem] = []
+        self._marks: list[pg.ScatterPlotItem] = []
         self._legend: tuple[str, ...] = ()
         self._limit: pg.InfiniteLine | None = None
         super().__init__(axes)
         self._names = tuple(curve.column for curve in curves)
         self._y_zero = y_zero
         self._y_log = y_log
+        self._is_robust = is_robust
         self._limit_at: float | None = None
         self._legend = tuple(curve.name for curve in curves)
         left = self._item.getAxis("left")
@@ -326,7 +335,11 @@ class TracePlot(Plot):
         self._show_nothing()
         for _ in curves:
             self._curves.append(pg.PlotCurveItem())
-        for item in self._curves:
+        if self.has_symbols:
+            self._marks = [
+                pg.ScatterPlotItem(symbol=each, size=SYMBOL) for each in SYMBOLS
+            ]
+        for item in (*self._curves, *self._marks):
             self._item.addItem(item)
         # Below a line in the upper half: within the plot
         place = {"position": 0.02, "anchors": [(0.0, 0.0), (0.0, 1.0)]}
@@ -346,6 +359,9 @@ class TracePlot(Plot):
         heights = [self._height(value) for value in values]
         for curve, height in zip(self._curves, heights, strict=True):
             curve.setData(x, height, connect="finite")
+        every = slice(None, None, max(len(x) // N_MARKED, 1))
+        for marks, height in zip(self._marks, heights, strict=False):
+            marks.setData(x[every], height[every])
         self._show_range()
 
     def set_limit(self, value: float | None, name: str = "") -> None:
@@ -367,6 +383,8 @@ class TracePlot(Plot):
             return
         self._show_numbers(True)
         in_sight = [self._height(value) for value in values]
+        if self._is_robust:
+            in_sight = list(map(_without_outliers, in_sight))
         if self._limit_at is not None:
             in_sight.append(self._height(np.array([self._limit_at])))
         n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
@@ -401,6 +419,9 @@ class TracePlot(Plot):
         colors = colors_of(self.palette())
         for curve, tone, dash in zip(self._curves, TONES, DASHES, strict=False):
             curve.setPen(pg.mkPen(colors.tone(tone), width=LINE, style=dash))
+        for marks, tone in zip(self._marks, TONES, strict=False):
+            marks.setPen(pg.mkPen(None))
+            marks.setBrush(pg.mkBrush(colors.tone(tone)))
         if self._limit is not None:
             self._limit.setPen(pg.mkPen(colors.muted, width=1))
             self._limit.label.setColor(colors.muted)
@@ -409,3 +430,14 @@ class TracePlot(Plot):
     @override
     def _named_curves(self) -> tuple[str, ...]:
         return self._legend if len(self._curves) > 1 else ()
+
+
+def _without_outliers(values: FloatArray) -> FloatArray:
+    """Return those of values (N,) that a plot must show: all but old outliers."""
+    if not np.isfinite(values).any():
+        return values
+    low, high = np.nanquantile(values, (0.25, 0.75))
+    reach = FENCE * (high - low)
+    is_usual = (low - reach <= values) & (values <= high + reach)
+    is_usual[int((1 - NEWEST) * len(values)) :] = True
+    return np.asarray(values[is_usual])

@@ -4347,6 +4347,14 @@ needed</source>
         <translation>图像</translation>
     </message>
     <message>
+        <source>Residuals and U</source>
+        <translation>残差与 U</translation>
+    </message>
+    <message>
+        <source>Tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
         <source>Residual of each image</source>
         <translation>每幅图像的残差</translation>
     </message>
@@ -4361,6 +4369,22 @@ needed</source>
     <message>
         <source>U of the tip in its weakest direction. The swing ends below the limit (horizontal line). Dashed: what more images cannot improve.</source>
         <translation>测头在最弱方向上的 U。降到限值（水平线）以下时摆动结束。虚线：更多图像也无法改善的部分。</translation>
+    </message>
+    <message>
+        <source>Tip of each image</source>
+        <translation>每幅图像的测头</translation>
+    </message>
+    <message>
+        <source>The tip by each image alone, from the cone: u to the right, v down, w away from the camera. A step means that the tip has slipped.</source>
+        <translation>仅由每幅图像得到的测头，相对于锥孔：u 向右，v 向下，w 远离相机。出现台阶表示测头滑动过。</translation>
+    </message>
+    <message>
+        <source>Estimate of the tip</source>
+        <translation>测头的估计</translation>
+    </message>
+    <message>
+        <source>The tip by all images so far, from its newest value. First estimates that are far off are cut off.</source>
+        <translation>由至今全部图像得到的测头，相对于其最新值。最初偏离很远的估计不全部显示。</translation>
     </message>
     <message>
         <source>limit {0} µm</source>

@@ -47,6 +47,27 @@ def test_a_limit_is_in_sight(decades: TracePlot) -> None:
     assert high > np.log10(50.0)
 
 
+def test_the_first_values_do_not_hide_the_others(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Tip / um"), [Curve("x_um")], is_robust=True))
+    values = np.where(np.arange(40) < 8, 5000.0, 0.5 * np.cos(np.arange(40)))
+    plot.set_data(np.arange(1.0, 41.0), values)
+
+    (left, _), (_, high) = plot.ranges()
+
+    assert left <= 1
+    assert high < 2
+
+
+def test_the_newest_value_is_in_sight_however_far_off_it_is(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Tip / um"), [Curve("x_um")], is_robust=True))
+    values = np.where(np.arange(40) < 38, np.cos(np.arange(40)), 5000.0)
+    plot.set_data(np.arange(1.0, 41.0), values)
+
+    _, (_, high) = plot.ranges()
+
+    assert high > 5000
+
+
 def test_curves_differ_by_more_than_their_colour(qtbot: QtBot) -> None:
     plot = shown(qtbot, TracePlot(Axes("Tip"), [Curve(a, a) for a in "xyz"]))
     plot.set_data(np.arange(1.0, 41.0), *np.ones((3, 40)))
@@ -54,9 +75,13 @@ def test_curves_differ_by_more_than_their_colour(qtbot: QtBot) -> None:
     assert canvas is not None
     items = canvas.getPlotItem().items
     pens = [item.opts["pen"] for item in items if isinstance(item, pg.PlotCurveItem)]
+    symbols = [
+        item.opts["symbol"] for item in items if isinstance(item, pg.ScatterPlotItem)
+    ]
 
     assert len({pen.style() for pen in pens}) == 3
     assert [pen.width() for pen in pens] == [2, 2, 2]
+    assert len(set(symbols)) == 3
 
 
 def test_axes_are_drawn_anew_only_when_their_range_changes(qtbot: QtBot) -> None:

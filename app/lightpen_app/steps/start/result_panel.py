@@ -36,7 +36,7 @@ from lightpen_app.work.swing_run import SwingRun
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
 SIZES = (  # of age, words and figures, where there is little room, and plenty
     (TextSize.TITLE, TextSize.SMALL, TextSize.BODY),
-    (TextSize.DISPLAY, TextSize.BODY, TextSize.TITLE),
+    (TextSize.DISPLAY, TextSize.BODY, TextSize.LEAD),
 )
 
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QProgressBar, QSizePolicy, QTabBar, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.swing.capture.kept_images import AcceptedImages
+from lightpen.swing.capture.kept_images import AcceptedImages, tip_offsets
 from lightpen.swing.capture.state import SwingState
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.words import MICROMETRES
+from lightpen_app.look.words import AXES, MICROMETRES
 from lightpen_app.steps.swing.page_state import SwingPageState, side_text
 from lightpen_app.widgets.controls import LazyWidget, PushButton
 from lightpen_app.widgets.fields import Translated
@@ -220,6 +220,8 @@ def _make_plots() -> "SwingPlots":
 
 
 LEAST_HEIGHT = 15 * GRID
+CAMERA_AXES = ("u", "v", "w")
+N_SHOWN = 2  # plots at a time
 
 
 @dataclass
@@ -232,7 +234,7 @@ class _Trace:
 
 
 class SwingPlots(Translated, QWidget):
-    """Residuals and U over the images."""
+    """Residuals and U, or in their place the tip of each image and its estimate."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -240,6 +242,9 @@ class SwingPlots(Translated, QWidget):
         self._turn = 0
 
         # Widgets
+        self._choice = QTabBar(documentMode=True, drawBase=False)
+        self._choice.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # Space is the swing's
+        self.say_items(self._choice, (self.tr("Residuals and U"), self.tr("Tip")))
         image = self.tr("image")
         axes = Axes(self.tr("Residual of each image"), image, "RMS / px")
         misfit = self.say(
@@ -259,35 +264,65 @@ class SwingPlots(Translated, QWidget):
                 "(horizontal line). Dashed: what more images cannot improve."
             ),
         )
+        axes = Axes(self.tr("Tip of each image"), image, "µm")
+        curves = [Curve(f"{a}_um", a) for a in CAMERA_AXES]
+        scatter = self.say(
+            TracePlot(axes, curves, is_robust=True),
+            tip=self.tr(
+                "The tip by each image alone, from the cone: u to the right, v down, w "
+                "away from the camera. A step means that the tip has slipped."
+            ),
+        )
+        axes = Axes(self.tr("Estimate of the tip"), image, "µm")
+        curves = [Curve(f"{a}_um", a) for a in AXES]
+        estimate = self.say(
+            TracePlot(axes, curves, is_robust=True),
+            tip=self.tr(
+                "The tip by all images so far, from its newest value. First estimates "
+                "that are far off are cut off."
+            ),
+        )
         self._traces = (
             _Trace(misfit, self._show_misfit),
             _Trace(uncertainty, self._show_uncertainty),
+            _Trace(scatter, self._show_scatter),
+            _Trace(estimate, self._show_estimate),
         )
 
         # Layout
-        horizontal_layout(self, *((plot, 1) for plot in self.plots()))
+        layout = vertical_layout(self, self._choice, spacing=0)
+        row = horizontal_layout(layout, *((plot, 1) for plot in self.plots()))
+        layout.setStretchFactor(row, 1)
         for plot in self.plots():
             plot.setMinimumHeight(LEAST_HEIGHT)
 
+        # Connections
+        self._choice.currentChanged.connect(self._on_choice_changed)
+
+        self._on_choice_changed()
         self._retranslate()
 
     def plots(self) -> tuple[TracePlot, ...]:
-        """Return the plots of misfit and uncertainty."""
+        """Return the plots: misfit, uncertainty, scatter and estimate."""
         return tuple(trace.plot for trace in self._traces)
 
     def show_next(self, state: SwingState, max_uncertainty: float) -> None:
-        """Update one of the plots, in turn; the limit of U is in mm.
+        """Update one of the plots in sight, in turn; the limit of U is in mm.
 
-        One at a time, so that the window is never held up by both of them.
+        One at a time, so that the window is never held up by all of them.
         """
         if self._limit != MICROMETRES * max_uncertainty:
             self._limit = MICROMETRES * max_uncertainty
             self._retranslate()
-        self._turn = (self._turn + 1) % len(self._traces)
-        trace = self._traces[self._turn]
+        self._turn = (self._turn + 1) % N_SHOWN
+        trace = self._traces[N_SHOWN * self._choice.currentIndex() + self._turn]
         if trace.shown is not state:
             trace.shown = state
             trace.show(state)
+
+    def _on_choice_changed(self) -> None:
+        for i, plot in enumerate(self.plots()):
+            plot.setVisible(i // N_SHOWN == self._choice.currentIndex())
 
     def _show_misfit(self, state: SwingState) -> None:
         self._traces[0].plot.set_data(_numbers(state.kept), state.kept.misfits)
@@ -299,6 +334,18 @@ class SwingPlots(Translated, QWidget):
         n_images = trace.n_images.astype(np.float64)
         values = MICROMETRES * finite, MICROMETRES * floors
         self._traces[1].plot.set_data(n_images, *values)
+
+    def _show_scatter(self, state: SwingState) -> None:
+        kept = state.kept
+        offsets: FloatArray = np.zeros((len(kept), 3))
+        if kept.seat is not None:
+            offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
+        self._traces[2].plot.set_data(_numbers(kept), *(MICROMETRES * offsets.T))
+
+    def _show_estimate(self, state: SwingState) -> None:
+        trace = state.trace
+        changes = MICROMETRES * (trace.tips - trace.tips[-1:])
+        self._traces[3].plot.set_data(trace.n_images.astype(np.float64), *changes.T)
 
     def _retranslate(self) -> None:
         words = "" if self._limit is None else f"{self._limit:g}"

@@ -609,7 +609,7 @@ def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
     large = letters()
 
     assert small == (TextSize.TITLE, TextSize.BODY)
-    assert large == (TextSize.DISPLAY, TextSize.TITLE)
+    assert large == (TextSize.DISPLAY, TextSize.LEAD)
 
 
 def test_a_tip_that_was_to_be_checked_stays_amber_with_its_reason(
