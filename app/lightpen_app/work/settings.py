@@ -285,6 +285,17 @@ class Settings(QObject):
         """Remember where results are saved."""
         self._save("last", {"export folder": folder})
 
+    def hidden_columns(self) -> tuple[int, ...]:
+        """Return the columns that the table of History does not show."""
+        try:
+            return in_shape(self._content["last"]["columns"], tuple[int, ...])
+        except (KeyError, DamagedError):
+            return ()
+
+    def set_hidden_columns(self, columns: tuple[int, ...]) -> None:
+        """Remember the columns that are not shown."""
+        self._save("last", {"columns": list(columns)})
+
     def laboratory(self) -> Laboratory | None:
         """Return the last named laboratory, by default that of the machine settings."""
         try:

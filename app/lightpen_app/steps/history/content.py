@@ -77,6 +77,7 @@ class HistoryContent(Translated, QWidget):
         super().__init__()
         kind_of = partial(event_text, services)
         self._chosen, self._tips = workbench.selection, workbench.library
+        self._settings = workbench.settings
         self._notices = workbench.notifications
         self._folder, self._now = workbench.folder, workbench.around.now
         self._logbook = workbench.run.logbook
@@ -126,6 +127,7 @@ class HistoryContent(Translated, QWidget):
         reader.due_read.connect(self._due.set_tips)
         self._filter.value_changed.connect(self.read_anew)
         self.table.block_wanted.connect(reader.read_block)
+        self.table.columns_changed.connect(self._on_columns_changed)
         self.table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
         self._entry.report_requested.connect(self._show_report)
@@ -136,6 +138,8 @@ class HistoryContent(Translated, QWidget):
         self._whole.checked.connect(self.checked)
 
         workbench.selection.changed.connect(self._on_workbench_changed)
+
+        self.table.set_hidden_columns(self._settings.hidden_columns())
 
     def check_result(self) -> ArchiveCheckResult | None:
         """Return the result of the last archive check."""
@@ -170,6 +174,9 @@ class HistoryContent(Translated, QWidget):
         self._notices.show_status(words.format(n_lines))
         # Deferred until the visible parts are shown.
         self._read_due()
+
+    def _on_columns_changed(self) -> None:
+        self._settings.set_hidden_columns(self.table.hidden_columns())
 
     def _on_selection_changed(self) -> None:
         line = self.table.current()

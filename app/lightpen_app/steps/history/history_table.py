@@ -7,6 +7,7 @@ from itertools import chain, islice
 from typing import Any
 
 from PySide6.QtCore import QItemSelectionModel, Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QWidget
 from typing_extensions import override
 
@@ -144,14 +145,20 @@ class HistoryTable(Translated, RowTable):
     block_wanted = Signal(int)
     # Other lines are current or selected, or were read by now.
     selection_changed = Signal()
+    columns_changed = Signal()  # the user chose other columns
 
     def __init__(self, kind_of: EventText) -> None:
         self._model = HistoryModel(kind_of)
         super().__init__(self._model)
         self.say(self, self.tr("Archive entries (newest first)"))
         self._model.setParent(self)
+        self._is_of_one_station = False
         for scrolls in (self.setVerticalScrollMode, self.setHorizontalScrollMode):
             scrolls(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self._shown = tuple(QAction(self, checkable=True) for _ in range(WORDS))
+        for each in (self, self.horizontalHeader()):
+            each.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+            each.addActions(self._shown)
         self.setMinimumHeight((LEAST_ROWS + 2) * ROW_HEIGHT)
         across = self.horizontalHeader()
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
@@ -161,6 +168,10 @@ class HistoryTable(Translated, RowTable):
             set_size(each, TextSize.SMALL)
 
         # Connections
+        for action in self._shown:
+            action.setChecked(True)
+            action.toggled.connect(self._show_columns)
+            action.triggered.connect(self.columns_changed)
         self._model.block_wanted.connect(
             self.block_wanted, Qt.ConnectionType.QueuedConnection
         )
@@ -193,8 +204,22 @@ class HistoryTable(Translated, RowTable):
         self._model.forget_block(first)
 
     def set_stations(self, stations: Sequence[str]) -> None:
-        """Hide the station where there is only one."""
-        self.setColumnHidden(STATION, len(stations) <= 1)
+        """Take over which stations the entries are of."""
+        self._is_of_one_station = len(stations) <= 1
+        self._show_columns()
+
+    def hidden_columns(self) -> tuple[int, ...]:
+        """Return the columns that the user does not want to see."""
+        return tuple(i for i, each in enumerate(self._shown) if not each.isChecked())
+
+    def set_hidden_columns(self, hidden: Sequence[int]) -> None:
+        """Hide columns; all others are shown."""
+        for i, action in enumerate(self._shown):
+            action.setChecked(i not in hidden)
+
+    def n_lines(self) -> int:
+        """Return the number of entries."""
+        return self._model.rowCount()
 
     def current(self) -> Line | None:
         """Return the current line."""
@@ -218,8 +243,16 @@ class HistoryTable(Translated, RowTable):
             r.top() <= last and first <= r.bottom() for r in ranges
         )
 
+    def _show_columns(self) -> None:
+        """Hide what the user does not want, and the station where there is only one."""
+        for column, action in enumerate(self._shown):
+            is_alone = column == STATION and self._is_of_one_station
+            self.setColumnHidden(column, is_alone or not action.isChecked())
+
     @override
     def _retranslate(self) -> None:
+        for action, title in zip(self._shown, self._model.titles(), strict=False):
+            action.setText(title)
         self.show_other_words()
 
 

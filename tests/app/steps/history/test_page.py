@@ -239,6 +239,22 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.statuses[-1] == "2 entries"
 
 
+def test_a_column_that_is_not_wanted_stays_hidden(desk: Desk) -> None:
+    desk.enter(3)
+    desk.open()
+
+    (tip,) = [each for each in desk.table.actions() if each.text() == "Tip"]
+    tip.trigger()
+
+    assert desk.table.isColumnHidden(TIP)
+    assert desk.workbench.settings.hidden_columns() == (TIP,)
+    again = HistoryPage(desk.workbench)
+    again.entered()
+    (table,) = again.findChildren(HistoryTable)
+    assert table.hidden_columns() == (TIP,)
+    again.shut_down()
+
+
 def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_apart(
     desk: Desk,
 ) -> None:
@@ -339,7 +355,7 @@ def test_at_the_usual_width_every_column_is_seen_and_reported_whole(
         desk.enter(2, f"T-{n}", 3 * n, origin)
     desk.open()
     desk.page.resize(976, 700)  # that of a window of 1280 px
-    desk.until(lambda: desk.table.model().rowCount() == 25)
+    desk.until(lambda: desk.table.n_lines() == 25)
 
     assert desk.table.verticalScrollBar().isVisible()
     desk.until(lambda: not desk.table.horizontalScrollBar().isVisible())

@@ -274,8 +274,7 @@ def test_the_trace_tells_every_estimate(whole: Station) -> None:
     assert len(trace.n_images) == whole.state.n_kept
     np.testing.assert_allclose(trace.uncertainties[-1], whole.state.kept.uncertainty)
     late = trace.uncertainties[-50:]
-    # What seat, lens and pen are off by is estimated anew with each image, so U may rise
-    # in between.
+    # What seat and lens are off by is estimated anew with each image: U may rise, too.
     assert (late[-1] < late[0]).all()
 
 
