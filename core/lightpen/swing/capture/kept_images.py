@@ -176,7 +176,7 @@ def _posed_by(rig: Rig, detection: PenDetection, c: int) -> PenDetection:
 MIN_JOINT = 8  # images of the first joint fit
 LEAVING = 0.01  # probability that an image is excluded though the tip rests
 MAX_PASSES = 3  # of looking for slipped images
-RENEWED = 0.02  # of the images; after so many more U is predicted anew
+RENEWED = 0.04  # of the images, which change U by 2 %; then it is predicted anew
 NO_NOISE = 1e-4  # px, less than any camera has
 
 
