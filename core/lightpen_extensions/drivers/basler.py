@@ -18,7 +18,7 @@ from lightpen_extensions.drivers.device_camera import (
     DeviceCamera,
     in_sentences,
 )
-from lightpen_extensions.drivers.genicam import GenapiFeatures, refusals
+from lightpen_extensions.drivers.genicam import GenapiDevice, GenapiFeatures, refusals
 
 NAME = "Basler (pylon)"
 # Kinds of connection, those first that are searched without asking the network.
@@ -26,19 +26,12 @@ LAYERS = ("BaslerCamEmu", "BaslerUsb", "BaslerGigE", "BaslerCxp")
 N_BUFFERS = 16  # images in transit; each buffer is returned once copied
 
 
-class BaslerDevice:
+class BaslerDevice(GenapiDevice):
     """A camera that pylon drives, found by its serial number."""
 
     def __init__(self, serial: str) -> None:
         self.serial = serial
         self._camera: Any = None
-        self._features: GenapiFeatures | None = None
-
-    @property
-    def features(self) -> GenapiFeatures:
-        """The features of the open camera."""
-        assert self._features is not None
-        return self._features
 
     def open(self) -> None:
         """Open the camera."""

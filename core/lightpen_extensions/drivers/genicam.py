@@ -122,7 +122,19 @@ POLL = 0.002  # s that a call may keep the other threads waiting
 PAUSE = 0.003  # s between two calls
 
 
-class GenicamDevice:
+class GenapiDevice:
+    """What all cameras with GenApi nodes share."""
+
+    _features: GenapiFeatures | None = None
+
+    @property
+    def features(self) -> GenapiFeatures:
+        """The features of the open camera."""
+        assert self._features is not None
+        return self._features
+
+
+class GenicamDevice(GenapiDevice):
     """A camera that a GenTL producer drives."""
 
     def __init__(self, place: SourcePlace) -> None:
@@ -130,13 +142,6 @@ class GenicamDevice:
         self._producer = place.producer
         self._harvester: Any = None
         self._acquirer: Any = None
-        self._features: GenapiFeatures | None = None
-
-    @property
-    def features(self) -> GenapiFeatures:
-        """The features of the open camera."""
-        assert self._features is not None
-        return self._features
 
     def open(self) -> None:
         """Open the camera."""
