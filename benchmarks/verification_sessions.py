@@ -17,10 +17,11 @@ from tests.simulated_sessions import (
     swings_of_pen,
 )
 
-from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
+from lightpen.archive.trends import TipEstimate
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.comparisons.pen_health import examine_pen
+from lightpen_extensions.comparisons.repeatability import measure_repeatability
 from lightpen_extensions.measure.tasks.drift import Drift
 from lightpen_extensions.simulator.swings import paper_camera
 

@@ -7,12 +7,6 @@ from typing import Any
 
 import pytest
 
-from lightpen.comparisons.assessment import (
-    USE_TIP,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-)
-from lightpen.comparisons.records import verification_record
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import InputFile
@@ -21,6 +15,12 @@ from lightpen.local_time import local_now
 from lightpen.record.folder import read_verification
 from lightpen_app_extensions.report.reporting import write_report
 from lightpen_app_extensions.report.verification import verification_print_report
+from lightpen_extensions.comparisons.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
+from lightpen_extensions.comparisons.records import verification_record
 from lightpen_program.extensions import main
 
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SIMULATOR = "simulator"
 OTHER = re.compile(r"lightpen_extensions\.(?!simulator)|lightpen_app_extensions")
-OF_MAIN = ("core/comparisons", "core/live", "core/pen_check", "core/swing", "app/shell")
+OF_MAIN = ("core/live", "core/pen_check", "core/swing", "app/shell")
 OPENED = """
 import sys
 from pathlib import Path

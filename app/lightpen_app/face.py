@@ -17,9 +17,11 @@ from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
-    from lightpen.archive.chains import Event
+    from lightpen.archive.chains import Event, StoredEntry
+    from lightpen.archive.trends import Trend
     from lightpen.record.exports import ExportFormat
     from lightpen.record.swings.solving import Solution
+    from lightpen.swing.status import SwingStatus
     from lightpen_app.work.chosen_files import SavePlace
 
 W = TypeVar("W", bound=QWidget)
@@ -126,6 +128,34 @@ class BudgetRow(QWidget):
         raise NotImplementedError
 
 
+class PressComparison(QObject):
+    """Compares a swing with firm pressure with the light one; this one cannot."""
+
+    compared = Signal(object)  # StatusMessage on the bending
+
+    is_here = False
+
+    def follow(self, status: "SwingStatus") -> None:
+        """Compare the swings of a status, if there are two."""
+
+    def shut_down(self) -> None:
+        """Compare no more."""
+
+
+class SelectionTab(QWidget):
+    """A tab of the step History on the entries that are selected there."""
+
+    verification_kept = Signal(object)  # Path: it is entered, and to be reported
+
+    def title(self) -> str:
+        """Return its title, in the language of the window."""
+        raise NotImplementedError
+
+    def set_value(self, selected: "Sequence[StoredEntry]", trend: "Trend") -> None:
+        """Show other entries, and the trend of the current one."""
+        raise NotImplementedError
+
+
 class Service(QObject):
     """An extension at work in one window; by default it does nothing.
 
@@ -192,6 +222,14 @@ class Service(QObject):
         """Make a check of the budget."""
         return None
 
+    def press_comparison(self) -> PressComparison | None:
+        """Make what compares a press test, for the step Review."""
+        return None
+
+    def selection_tab(self) -> SelectionTab | None:
+        """Make a tab of the step History."""
+        return None
+
     def event_text(self, event: "Event") -> str:
         """Return the kind of its entry in the archive; empty for an entry of others."""
         return ""
@@ -250,6 +288,12 @@ def report_printer(
     """Return what shows reports for a page."""
     printers = (each.report_printer(place, page) for each in services)
     return next(filter(None, printers), None) or ReportPrinter(page)
+
+
+def press_comparison(services: Services) -> PressComparison:
+    """Return what compares a press test."""
+    found = (each.press_comparison() for each in services)
+    return next(filter(None, found), None) or PressComparison()
 
 
 def can_discover(services: Services) -> bool:

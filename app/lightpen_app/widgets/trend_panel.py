@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen.archive.trends import Trend
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.repeatability import Trend
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import AXES, day_text, shortened

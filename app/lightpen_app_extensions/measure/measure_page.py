@@ -5,7 +5,6 @@ from dataclasses import replace
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.languages import worded
 from lightpen_app.look.phrases import DECISION_MARKS, Instruction
@@ -22,6 +21,7 @@ from lightpen_app_extensions.measure.plan_panel import PlanPanel
 from lightpen_app_extensions.measure.presenter import VerifyPresenter, VerifyView
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
 from lightpen_extensions.measure.measuring.report import DECISIONS
 from lightpen_extensions.measure.measuring.surfaces import NAMES
 from lightpen_extensions.measure.session import SessionSetup, SessionState, bands_so_far

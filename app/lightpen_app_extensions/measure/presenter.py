@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QObject
 
 from lightpen.cameras.protocol import Connection
-from lightpen.comparisons.assessment import CALIBRATE_AGAIN, VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import InputFile
 from lightpen.model.names import Origin
@@ -21,6 +20,10 @@ from lightpen_app.widgets.state_banner import State, status_text
 from lightpen_app_extensions.measure.check_list import CheckRow, value_text
 from lightpen_app_extensions.measure.part_view import FigureValue, posture_value
 from lightpen_app_extensions.measure.service import MeasureService, VerificationRun
+from lightpen_extensions.comparisons.assessment import (
+    CALIBRATE_AGAIN,
+    VerificationAssessment,
+)
 from lightpen_extensions.measure.probing.probing import SETTLING, ProbingPhase
 from lightpen_extensions.measure.session import (
     BROKEN_OFF,

@@ -8,7 +8,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.artefacts import Artefact
 from lightpen_app.look.languages import worded
@@ -34,6 +33,7 @@ from lightpen_extensions.comparisons.pen_health import (
     PenOverTime,
     read_pen_over_time,
 )
+from lightpen_extensions.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 
 LATEST = 8  # swings; the table has room for as many

@@ -19,12 +19,6 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import (
-    VerificationAssessment,
-    accepted,
-    check,
-    refused,
-)
 from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import hashed
@@ -38,6 +32,12 @@ from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.comparisons.assessment import (
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
 
 MIN_SWINGS = 2
 MOST = 20  # swings of a pen that are read, the newest

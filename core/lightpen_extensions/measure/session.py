@@ -8,13 +8,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
-from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.probing import (
     ProbingPhase,

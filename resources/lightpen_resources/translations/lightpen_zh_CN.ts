@@ -1177,10 +1177,6 @@
         <translation>条目</translation>
     </message>
     <message>
-        <source>Repeatability</source>
-        <translation>重复性</translation>
-    </message>
-    <message>
         <source>Due</source>
         <translation>到期</translation>
     </message>
@@ -3049,7 +3045,7 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>PressTestControl</name>
+    <name>PressTests</name>
     <message>
         <source>Press test</source>
         <translation>压力试验</translation>
@@ -3746,6 +3742,10 @@ needed</source>
     <message>
         <source>Repeatability report...</source>
         <translation>重复性报告…</translation>
+    </message>
+    <message>
+        <source>Repeatability</source>
+        <translation>重复性</translation>
     </message>
     <message>
         <source>Mean / mm</source>
@@ -5392,14 +5392,6 @@ needed</source>
         <translation>下一步：固定锥孔和相机，然后重新摆动。</translation>
     </message>
     <message>
-        <source>Next: clean tip and artefact, clamp artefact and camera, and verify again.</source>
-        <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
-    </message>
-    <message>
-        <source>Next: continue with this stylus.</source>
-        <translation>下一步：继续使用此测杆。</translation>
-    </message>
-    <message>
         <source>Next: repeat the swing with the tip pressed in.</source>
         <translation>下一步：压紧测头，重新摆动。</translation>
     </message>
@@ -5408,16 +5400,8 @@ needed</source>
         <translation>下一步：改为报告同一组图像的联合拟合。</translation>
     </message>
     <message>
-        <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
-        <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
-    </message>
-    <message>
         <source>Next: tighten or clamp what moved, then repeat the swing; or use the longer part.</source>
         <translation>下一步：紧固或夹紧移动的部件后重新摆动；或使用较长部分。</translation>
-    </message>
-    <message>
-        <source>Next: tighten the stylus or use a shorter, stiffer one, and calibrate again with gentle pressure.</source>
-        <translation>下一步：拧紧测杆，或换用更短、更硬的测杆，然后以轻压重新标定。</translation>
     </message>
     <message>
         <source>No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.</source>
@@ -5530,10 +5514,6 @@ needed</source>
     <message>
         <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
-    </message>
-    <message>
-        <source>Press test: U of the bending is {uncertainty:.4f} mm, too large to count.</source>
-        <translation>压力试验：弯曲的 U 为 {uncertainty:.4f} mm，过大，不予采用。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and keep it there.</source>
@@ -5862,10 +5842,6 @@ needed</source>
     <message>
         <source>The tip moved in the pen</source>
         <translation>测头在光笔中移动了</translation>
-    </message>
-    <message>
-        <source>The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.</source>
-        <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
     </message>
     <message>
         <source>The translations are about {typical:.3g} long: they are taken as metres.</source>
@@ -6216,10 +6192,6 @@ needed</source>
         <translation>{n_images} 幅图像中有 {n_tagged} 幅（第一幅为 {name}）带有方向标记 {tag}（{meaning}）。程序不执行该标记：像素按存储的方向使用，内参文件必须是在这一方向上标定的。如果图像被其他程序旋转过，请按相机原样输出重新保存。</translation>
     </message>
     <message>
-        <source>{n_tips} calibration does not show repeatability; give at least two, usually ten.</source>
-        <translation>{n_tips} 次标定无法显示重复性；请至少给出两次，通常十次。</translation>
-    </message>
-    <message>
         <source>{n_views} images show the board; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.</source>
         <translation>{n_views} 幅图像显示标定板；至少需要 {least} 幅，{enough} 幅更好。请增加标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
     </message>
@@ -6454,10 +6426,6 @@ needed</source>
     <message>
         <source>3D Slicer</source>
         <translation>3D Slicer</translation>
-    </message>
-    <message>
-        <source>A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.</source>
-        <translation>压力试验比较使用相同相机和 LED 的两次摆动。请给出同一工位、同一光笔的两次标定。</translation>
     </message>
     <message>
         <source>A swing with firm pressure is compared only and cannot be accepted.</source>
@@ -7248,10 +7216,6 @@ needed</source>
         <translation>下一步：继续采集图像。本次摆动的图像会保留。</translation>
     </message>
     <message>
-        <source>Next: check that the intrinsics file belongs to this camera and the LED file to this pen.</source>
-        <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
-    </message>
-    <message>
         <source>Next: check that the right tip is fitted, clean and tight, then repeat the swing.</source>
         <translation>下一步：检查所装测头是否正确、清洁、紧固，然后重新摆动。</translation>
     </message>
@@ -7292,32 +7256,8 @@ needed</source>
         <translation>下一步：让光笔达到室温，并测量一段有证书的长度。</translation>
     </message>
     <message>
-        <source>Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.</source>
-        <translation>下一步：触测更多的点，每点更多图像，将光笔向各侧进一步倾斜并转动。</translation>
-    </message>
-    <message>
-        <source>Next: repeat the calibration, with the tip seated anew each time.</source>
-        <translation>下一步：重复标定，每次都重新放置测头。</translation>
-    </message>
-    <message>
-        <source>Next: repeat the press test with more images, tilted farther to all sides.</source>
-        <translation>下一步：以更多图像、向各方向更大倾斜，重做压力试验。</translation>
-    </message>
-    <message>
         <source>Next: use the points probed between the visits.</source>
         <translation>下一步：使用各次触测漂移参考点之间的测点。</translation>
-    </message>
-    <message>
-        <source>Next: use the tip for measurement.</source>
-        <translation>下一步：使用该测头进行测量。</translation>
-    </message>
-    <message>
-        <source>Next: use the tip of the latest calibration.</source>
-        <translation>下一步：使用最近一次标定的测头。</translation>
-    </message>
-    <message>
-        <source>Next: verify the tip in a fixed point, or probe again with the pen tilted and turned another way at each point.</source>
-        <translation>下一步：用固定点验证测头，或重新触测，每点以不同方式倾斜和转动光笔。</translation>
     </message>
     <message>
         <source>No LED moved relative to the others in {n_swings} swings.</source>
@@ -7566,14 +7506,6 @@ needed</source>
     <message>
         <source>Move {axis}</source>
         <translation>位移 {axis}</translation>
-    </message>
-    <message>
-        <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm.</source>
-        <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm。</translation>
-    </message>
-    <message>
-        <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
-        <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
     </message>
     <message>
         <source>Probe {what}: {n_points} of {needed} points.</source>
@@ -7984,10 +7916,6 @@ needed</source>
         <translation>测头偏离原位 {distance:.2f} mm。请放回锥孔，并检查锥孔是否夹紧。</translation>
     </message>
     <message>
-        <source>The tip scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm. Probe a fixed point several times: whether it scatters alike shows what moved.</source>
-        <translation>测头沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。请多次触测一个固定点：它是否同样散布可说明是什么在移动。</translation>
-    </message>
-    <message>
         <source>The tip seating varied by {distance:.4f} mm (standard deviation) from image to image; U includes this. Clean tip and cone, check for wear, and press the tip in.</source>
         <translation>测头就位在各图像之间变化 {distance:.4f} mm（标准差），已计入 U。请清洁测头和锥孔，检查磨损，并压紧测头。</translation>
     </message>
@@ -8248,10 +8176,6 @@ needed</source>
         <translation>相机标定</translation>
     </message>
     <message>
-        <source>camera drift measurement</source>
-        <translation>相机漂移测量记录</translation>
-    </message>
-    <message>
         <source>cameras in {name} is not a list of 2 to {most} cameras. A single camera needs no rig file.</source>
         <translation>{name} 中的 cameras 不是 2 至 {most} 台相机的列表。单台相机不需要相机组文件。</translation>
     </message>
@@ -8508,10 +8432,6 @@ needed</source>
         <translation>{n_points} 个点不能确定{kind}；至少需要 {needed} 个。请触测更多点。</translation>
     </message>
     <message>
-        <source>{n_tips} calibrations do not suffice for a verdict on repeatability: {needed} are needed, and ten for control limits.</source>
-        <translation>{n_tips} 次标定不足以对重复性作出结论：需要 {needed} 次，控制限需要十次。</translation>
-    </message>
-    <message>
         <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it.</source>
         <translation>{name} 描述的是鱼眼镜头（{model}）。支持 Kannala 和 Brandt 的鱼眼模型（等距）：请用该模型重新标定相机。</translation>
     </message>
@@ -8754,10 +8674,6 @@ needed</source>
     <message>
         <source>{path} is not a calibration record. Give a file written by the command calibrate, or an accepted result.</source>
         <translation>{path} 不是标定记录。请给出 calibrate 命令写出的文件，或已接受的结果。</translation>
-    </message>
-    <message>
-        <source>{path} is not a {what}, or was modified after it was written. Give the original JSON file.</source>
-        <translation>{path} 不是{what}，或写出后被更改。请给出写出时的 JSON 文件。</translation>
     </message>
     <message>
         <source>{path} was modified after recording (wrong checksum). Restore it from a copy.</source>

@@ -13,8 +13,6 @@ from lightpen.archive.chains import Event, Kind, entries_of, records_of
 from lightpen.archive.checks import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import look_into
-from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import InputFile
 from lightpen.formats.own_json import record_bytes
@@ -39,6 +37,8 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
+from lightpen_extensions.comparisons.records import verification_record
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")

@@ -1,6 +1,7 @@
-"""Panel of the whole archive: check and save."""
+"""Panels on the whole archive: check and save, and tips that are due."""
 
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from enum import Enum, auto
 from functools import partial
 from pathlib import Path
@@ -10,17 +11,19 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
-from lightpen.archive.history import export_entries, save_entries
+from lightpen.archive.history import DueTip, export_entries, save_entries
 from lightpen.archive.logbook import ReplicationState
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import LEAST_SHOWN, PARTED, day_text, shortened
 from lightpen_app.steps.history.history_table import FilterBar
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.controls import ask_file
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
@@ -171,6 +174,65 @@ class ArchivePanel(Translated, QWidget):
             return StatusMessage.warning(text.format(*counts))
         text = self.tr("No changes in {0} entries and {1} files")
         return StatusMessage.good(text.format(*counts))
+
+
+class DuePanel(Translated, QWidget):
+    """Shows the current tips with their due dates."""
+
+    def __init__(self, now: Callable[[], datetime]) -> None:
+        super().__init__()
+        self._now = now
+        self._tips: tuple[DueTip, ...] = ()
+
+        # Widgets
+        self._head = text_label(TextSize.LEAD)
+        self._table = NumberTable()
+
+        # Layout
+        vertical_layout(self, self._head, self._table, 1, margins=(0, GRID, 0, 0))
+
+        self._retranslate()
+
+    def set_tips(self, tips: Sequence[DueTip]) -> None:
+        """Show other tips."""
+        self._tips = tuple(tips)
+        self._retranslate()
+
+    def _retranslate(self) -> None:
+        now = self._now()
+        n_due = sum(tip.is_due(now) for tip in self._tips)
+        self._head.setText(
+            self.tr("{0} of {1} tips in use at this station are due.").format(
+                n_due, len(self._tips)
+            )
+            if self._tips
+            else self.tr("No tip is in use at this station.")
+        )
+        self._table.setVisible(bool(self._tips))
+        columns = (
+            self.tr("Calibrated"),
+            self.tr("Due"),
+            self.tr("Swings since"),
+            self.tr("Swings left"),
+            self.tr("State"),
+        )
+        rows = tuple(map(_name, self._tips))
+        cells = tuple(self._cells(tip, now) for tip in self._tips)
+        self._table.set_value(Figures(columns, rows, cells))
+
+    def _cells(self, tip: DueTip, now: datetime) -> tuple[str, ...]:
+        days = (tip.calibrated, tip.due)
+        return (
+            *(day_text(day) for day in days),
+            f"{tip.n_swings}",
+            self.tr("No limit") if tip.n_left is None else f"{max(0, tip.n_left)}",
+            self.tr("DUE") if tip.is_due(now) else self.tr("valid"),
+        )
+
+
+def _name(tip: DueTip) -> str:
+    names = tip.entry.entry.event.names
+    return PARTED.join(shortened(n, LEAST_SHOWN) for n in (names.pen, names.tip))
 
 
 T = TypeVar("T")

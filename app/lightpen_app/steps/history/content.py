@@ -1,6 +1,6 @@
 """Content of the step History: the entries of the archive and their evaluation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,13 +12,8 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from lightpen.archive.chains import Kind, StoredEntry
 from lightpen.archive.checks import ArchiveCheckResult
 from lightpen.archive.history import EntryFilter, Line
-from lightpen.comparisons.records import repeatability_entries, verification_record
-from lightpen.comparisons.repeatability import Repeatability, Trend
-from lightpen.formats.opened_files import InputFile
-from lightpen.formats.own_json import file_entry
-from lightpen.model.limits import DueRule, VerificationLimits, rule_in_words
-from lightpen.model.names import Origin
-from lightpen.record.folder import attributed, keep_verification
+from lightpen.archive.trends import Trend
+from lightpen.model.limits import DueRule
 from lightpen_app.face import Services, event_text, report_printer
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
@@ -26,42 +21,16 @@ from lightpen_app.steps.history.archive_panel import (
     NOTICE,
     ArchiveControl,
     ArchivePanel,
+    DuePanel,
 )
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import FilterBar, HistoryTable
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
-from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
-from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fields import Text, Translated
 from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
-
-
-def keep_study(
-    data: Path,
-    found: Repeatability,
-    entries: Sequence[StoredEntry],
-    limits: VerificationLimits,
-    operator: str,
-) -> Path:
-    """Keep a study of tips as a verification of a data folder, and return its file."""
-    events = [each.entry.event for each in entries]
-    results = [each.result for each in events if each.result is not None]
-    record = verification_record(
-        "repeatability",
-        repeatability_entries(found),
-        found.assessment,
-        {"repeatability": limits.repeatability},
-        {"files": [file_entry(InputFile(Path(r.place), r.sha256)) for r in results]},
-        rule_in_words(limits),
-    )
-    is_simulated = any(each.is_simulated for each in events)
-    origin = Origin.SIMULATED if is_simulated else events[-1].origin
-    names = replace(events[-1].names, operator=operator)
-    record = attributed(record, names, origin)
-    return keep_verification(data, record, is_simulated=is_simulated)
-
 
 T = TypeVar("T")
 TABLE_SHARE, TABS_SHARE = 3, 4  # of the height
@@ -93,14 +62,15 @@ class HistoryContent(Translated, QWidget):
         self._tabs = QTabWidget()
         self._entry = EntryPanel(kind_of)
         self._trend_panel = TrendPanel()
-        self._selection = SelectionPanel()
+        made = (each.selection_tab() for each in services)
+        self._of_services = tuple(filter(None, made))
         self._due = DuePanel(workbench.around.now)
         self._archive = ArchivePanel()
         self._whole = ArchiveControl(workbench, self._archive, self._filter)
         tabs = (
             (self._trend_panel, self.tr("Trend")),
             (self._entry, self.tr("Entry")),
-            (self._selection, self.tr("Repeatability")),
+            *((each, Text(each.title)) for each in self._of_services),
             (self._due, self.tr("Due")),
             (self._archive, self.tr("Archive")),
         )
@@ -134,7 +104,8 @@ class HistoryContent(Translated, QWidget):
         self._entry.set_has_report(self._print_report.is_here)
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
-        self._selection.report_requested.connect(self._report_study)
+        for each in self._of_services:
+            each.verification_kept.connect(self._on_verification_kept)
         self._whole.checked.connect(self.checked)
 
         workbench.selection.changed.connect(self._on_workbench_changed)
@@ -210,8 +181,8 @@ class HistoryContent(Translated, QWidget):
     def _show_selection(self) -> None:
         entries = [line.entry for line in self.table.selected()]
         selected = [entry for entry in entries if entry is not None]
-        self._selection.set_limits(self._chosen.limits.verification)
-        self._selection.set_value(selected, self._trend)
+        for each in self._of_services:
+            each.set_value(selected, self._trend)
 
     def _read_due(self) -> None:
         self._rule = self._chosen.limits.due
@@ -248,24 +219,9 @@ class HistoryContent(Translated, QWidget):
         else:
             self._print_report.show(lambda: folder / result.place)
 
-    def _report_study(self) -> None:
-        """Keep and enter the repeatability that is shown, and show its report."""
-        found, entries = self._selection.repeatability(), self._selection.studied()
-        if found is None:
-            return
-        folder, logbook = self._folder, self._logbook
-        operator = self._chosen.preparation.names.operator
-        limits = self._selection.limits()
-
-        def keep(_: Report) -> Path:
-            file = keep_study(folder, found, entries, limits, operator)
-            logbook.enter_owed()
-            return file
-
-        job = Job(keep, self)
-
-        job.succeeded.connect(self._print_report.show_verification)
-        job.start(lambda _: self.read_anew(), self._show_fault)
+    def _on_verification_kept(self, file: Path) -> None:
+        self.read_anew()
+        self._print_report.show_verification(file)
 
     def _on_report_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved in {0}").format(path.parent))

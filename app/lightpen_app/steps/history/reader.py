@@ -21,7 +21,7 @@ from lightpen.archive.history import (
 )
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook import ReplicationState
-from lightpen.comparisons.repeatability import trend_of
+from lightpen.archive.trends import trend_of
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
 from lightpen_app.work.job import Job, Report

@@ -14,11 +14,11 @@ from lightpen.model.names import Method
 from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_app.face import Services, verify_step
+from lightpen_app.face import Services, press_comparison, verify_step
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.review.acceptance import AcceptanceControl, PressTestControl
+from lightpen_app.steps.review.acceptance import AcceptanceControl
 from lightpen_app.steps.review.result_export import ResultExport
-from lightpen_app.steps.review.result_panel import reviewed_result
+from lightpen_app.steps.review.result_panel import bending_message, reviewed_result
 from lightpen_app.steps.review.view import ReviewView
 from lightpen_app.steps.review.view_state import (
     OF_FILES,
@@ -61,10 +61,8 @@ class ReviewPage(Page):
         self._methods: MethodsPanel | None = None
         self._painted: SwingAssessment | None = None  # since it is shown
         self._acceptance = AcceptanceControl(self._selection, self._run, view)
-        self._press = PressTestControl(
-            *(self._run, view, workbench.library, workbench.notifications),
-            *(workbench.folder, workbench.around.now),
-        )
+        self._press = press_comparison(services)
+        self._library, self._now = workbench.library, workbench.around.now
         self._along = ResultExport(self._run, workbench.save_place, services, self)
 
         # Layout
@@ -83,6 +81,10 @@ class ReviewPage(Page):
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.methods_made.connect(self._on_methods_made)
         self._along.follow(view.tools)
+        view.tools.set_can_press(self._press.is_here)
+        view.tools.press_requested.connect(lambda: self._ask(SwingWorkflow.press))
+        self._library.changed.connect(self._show_bending)
+        self._press.compared.connect(view.result.set_bending)
         self._along.message_sent.connect(notices.show_status)
         self._along.failed.connect(partial(notices.notify, self.key))
 
@@ -188,6 +190,8 @@ class ReviewPage(Page):
         if (now.result, now.assessment) != (before.result, before.assessment):
             self._view.end_questions()
         self._view.solving.set_running(now.is_solving)
+        if (now.solution, now.pressed) != (before.solution, before.pressed):
+            self._show_bending()
         self._press.follow(now)
         if now.assessment is not before.assessment:
             reviewed = reviewed_result(now)
@@ -198,6 +202,11 @@ class ReviewPage(Page):
         self.changed.emit()
         if self.isVisible() and returns_to_swing(before, now):
             self.step_requested.emit("swing")
+
+    def _show_bending(self) -> None:
+        """Show the bending that counts for the tip of the swing."""
+        library, today = self._library.library, self._now().date()
+        self._view.result.set_bending(bending_message(self._run.status, library, today))
 
     def _refresh(self) -> None:
         """Show the current state."""

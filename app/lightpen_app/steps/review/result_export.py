@@ -174,6 +174,10 @@ class ResultTools(Translated, QWidget):
         words = self.tr("Save results, named by pen, tip and date")
         self._save.set_why_not(why_not, words)
 
+    def set_can_press(self, can_press: bool) -> None:
+        """Show the press test if something can compare it."""
+        self._press.setVisible(can_press)
+
     def set_has_report(self, has_report: bool) -> None:
         """Show the report if something can show it."""
         self._report.setVisible(has_report)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from datetime import date
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
@@ -12,7 +12,9 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.consistency_test import SelfCheck
 from lightpen.estimation.reports.report_warnings import reported
 from lightpen.estimation.reports.verdict import halves_agree
-from lightpen.model.bending import Bending
+from lightpen.model.bending import ASSUMED_BENDING
+from lightpen.model.names import Origin
+from lightpen.record.library.tip_library import Library
 from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.solving import Solution
@@ -24,7 +26,6 @@ from lightpen_app.look.layouts import (
     horizontal_layout,
     vertical_layout,
 )
-from lightpen_app.look.phrases import GRADE_MARKS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import AXES, day_text, mm_text
@@ -32,9 +33,6 @@ from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import PageScroll
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
-
-if TYPE_CHECKING:
-    from lightpen.comparisons.press_test import PressTest
 
 
 @dataclass(frozen=True)
@@ -214,8 +212,6 @@ class ResultPanel(Translated, QFrame):
         self._halves = SignLabel()
         self._self_check = SignLabel()
         self._bending = SignLabel()
-        self._bending_value: Bending | None = None
-        self._pressed: PressTest | None = None  # of this session
         self._images = SignLabel()
 
         # Layout
@@ -237,32 +233,17 @@ class ResultPanel(Translated, QFrame):
         self._value = value
         self._refresh()
 
-    def set_bending(self, bending: Bending, pressed: "PressTest | None") -> None:
+    def set_bending(self, message: StatusMessage) -> None:
         """Show the bending that counts for the tip, or the press test just made."""
-        self._bending_value, self._pressed = bending, pressed
-        self._show_bending()
-
-    def _show_bending(self) -> None:
-        bending, found = self._bending_value, self._pressed
-        self._bending.setVisible(bending is not None and self._value is not None)
-        if found is not None:
-            text = " ".join(map(worded, found.words))
-            mark = GRADE_MARKS[found.assessment.grade]
-            self._bending.set_value(StatusMessage(text, *mark))
-        elif bending is not None:
-            text, is_good = worded(bending.words), bending.measured is not None
-            self._bending.set_value(
-                StatusMessage.good(text)
-                if is_good and not bending.is_overdue
-                else StatusMessage(text, Sign.RING, Tone.PLAIN)
-            )
+        self._bending.set_value(message)
+        self._bending.setVisible(self._value is not None)
 
     def _retranslate(self) -> None:
         self._refresh()
 
     def _refresh(self) -> None:
         outcome = self._value
-        self._show_bending()
+        self._bending.setVisible(outcome is not None)
         if outcome is None:
             self._comparison.set_value(Figures())
             self._as_found.set_value(StatusMessage())
@@ -335,6 +316,19 @@ class ResultPanel(Translated, QFrame):
         if check.is_passed:
             return StatusMessage.good(text)
         return StatusMessage.warning(text)
+
+
+def bending_message(
+    status: SwingStatus, library: Library, today: date
+) -> StatusMessage:
+    """Return the bending that counts for the tip of a swing, in words."""
+    bending = ASSUMED_BENDING
+    if status.origin is not Origin.SIMULATED:
+        bending = library.bending_of(status.names.tip, today)
+    text, is_measured = worded(bending.words), bending.measured is not None
+    if is_measured and not bending.is_overdue:
+        return StatusMessage.good(text)
+    return StatusMessage(text, Sign.RING, Tone.PLAIN)
 
 
 def _tip_value(outcome: ReviewedResult) -> TipValue:

@@ -18,14 +18,6 @@ from lightpen.commands.console import (
     shown,
     verdict_status,
 )
-from lightpen.comparisons.press_test import PRESS_TEST, PressTest, press_test
-from lightpen.comparisons.records import (
-    BY_SIMPLE_ACCEPTANCE,
-    COLUMN,
-    TITLE,
-    verdict_lines,
-    verification_record,
-)
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
@@ -51,6 +43,14 @@ from lightpen_extensions.comparisons.pen_health import (
     PenHealth,
     examine_pen,
     require_one_pen,
+)
+from lightpen_extensions.comparisons.press_test import PRESS_TEST, PressTest, press_test
+from lightpen_extensions.comparisons.records import (
+    BY_SIMPLE_ACCEPTANCE,
+    COLUMN,
+    TITLE,
+    verdict_lines,
+    verification_record,
 )
 
 

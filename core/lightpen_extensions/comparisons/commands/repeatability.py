@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpen.archive.trends import TipEstimate
 from lightpen.commands.arguments import above_zero, add_json
 from lightpen.commands.console import (
     printing,
@@ -13,12 +14,6 @@ from lightpen.commands.console import (
     shown,
     verdict_status,
 )
-from lightpen.comparisons.records import (
-    repeatability_entries,
-    repeatability_text,
-    verification_record,
-)
-from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
 from lightpen.errors import UsageError
 from lightpen.formats.opened_files import all_hashed
 from lightpen.formats.own_json import file_entry
@@ -32,6 +27,12 @@ from lightpen_extensions.comparisons.commands.entering import (
     limits_in_force,
 )
 from lightpen_extensions.comparisons.pen_health import require_one_pen
+from lightpen_extensions.comparisons.records import (
+    repeatability_entries,
+    repeatability_text,
+    verification_record,
+)
+from lightpen_extensions.comparisons.repeatability import measure_repeatability
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:

@@ -16,8 +16,6 @@ from lightpen.commands.console import (
     verdict_status,
     write_record,
 )
-from lightpen.comparisons.assessment import VERIFY_AGAIN, VerificationAssessment, check
-from lightpen.comparisons.records import COLUMN, verdict_lines
 from lightpen.errors import FileError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.files import FileFormat, write_whole
@@ -26,6 +24,11 @@ from lightpen.model.artefacts import REFERENCE, Artefact, ArtefactKind, Side
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
+from lightpen_extensions.comparisons.assessment import (
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    check,
+)
 from lightpen_extensions.comparisons.commands.entering import (
     add_ball,
     add_entering,
@@ -37,6 +40,7 @@ from lightpen_extensions.comparisons.commands.pens import (
     add_verify_pen,
     add_verify_press,
 )
+from lightpen_extensions.comparisons.records import COLUMN, verdict_lines
 from lightpen_extensions.measure.commands.touched import (
     MeasuredRuns,
     add_runs,

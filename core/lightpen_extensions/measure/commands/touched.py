@@ -11,8 +11,6 @@ import numpy as np
 
 from lightpen.commands.arguments import add_bits, add_cameras_and_pen
 from lightpen.commands.console import centers_at, lacking, progress, require_other_file
-from lightpen.comparisons.assessment import VerificationAssessment, read_drift
-from lightpen.comparisons.records import verification_record
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -25,7 +23,12 @@ from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
 from lightpen.record.folder import conditions_entries
+from lightpen_extensions.comparisons.assessment import (
+    VerificationAssessment,
+    read_drift,
+)
 from lightpen_extensions.comparisons.commands.entering import limits_in_force
+from lightpen_extensions.comparisons.records import verification_record
 from lightpen_extensions.measure.probing.probing import (
     FAST,
     ONE_IMAGE,

@@ -16,8 +16,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.records import verification_record
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -41,6 +39,8 @@ from lightpen.record.library.supervision import (
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
+from lightpen_extensions.comparisons.records import verification_record
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.sources import PenCameras
 from lightpen_extensions.measure.session import SessionSetup, VerificationStatus

@@ -17,13 +17,6 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import (
-    VERIFY_AGAIN,
-    VerificationAssessment,
-    accepted,
-    check,
-    graded,
-)
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -31,6 +24,13 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import COVERAGE_FACTOR, Decision, chi_square_quantile
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import angles_between
+from lightpen_extensions.comparisons.assessment import (
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    graded,
+)
 from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.fixed_point import (
     ELSEWHERE,

@@ -14,17 +14,6 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import (
-    CALIBRATE_AGAIN,
-    MORE_POINTS,
-    RELEVANT,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-    accepted,
-    check,
-    refused,
-)
-from lightpen.comparisons.repeatability import Scatter
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -37,6 +26,17 @@ from lightpen.model.coverage import (
     symmetric_root,
 )
 from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.comparisons.assessment import (
+    CALIBRATE_AGAIN,
+    MORE_POINTS,
+    RELEVANT,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen_extensions.comparisons.repeatability import Scatter
 from lightpen_extensions.measure.measuring.report import (
     ResultRow,
     ResultTable,

@@ -14,14 +14,6 @@ import numpy as np
 from msgspec import structs
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import (
-    BETTER_POSTURES,
-    CHECK_FILES,
-    VerificationAssessment,
-    accepted,
-    check,
-    refused,
-)
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -30,6 +22,14 @@ from lightpen.model.artefacts import Side
 from lightpen.model.coverage import Decision
 from lightpen.model.rigid import UPRIGHT_AXIS
 from lightpen.record.folder import MEASURED_PART
+from lightpen_extensions.comparisons.assessment import (
+    BETTER_POSTURES,
+    CHECK_FILES,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
 from lightpen_extensions.measure.measuring.features import Feature, fit_feature
 from lightpen_extensions.measure.measuring.next_touch import (
     PartTouches,

@@ -13,12 +13,12 @@ import numpy as np
 from msgspec import Meta
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import Decision
 from lightpen.model.limits import BALL_UNCERTAINTY, VerificationLimits, rule_in_words
 from lightpen.record.folder import MEASURED_PART
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
 from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
 from lightpen_extensions.measure.measuring.report import ResultTable
 from lightpen_extensions.measure.tasks.probed_point import NO_DRIFT, ProbedPoint

@@ -33,12 +33,6 @@ from lightpen.archive.checks import ArchiveCheckResult, check_archive
 from lightpen.archive.growth import append
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.store import Database
-from lightpen.comparisons.assessment import (
-    USE_TIP,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-)
-from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.names import Origin
@@ -53,7 +47,7 @@ from lightpen.record.swings.header import Names
 from lightpen_app.face import Service
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.words import unbroken
-from lightpen_app.steps.history.archive_panel import ArchivePanel
+from lightpen_app.steps.history.archive_panel import ArchivePanel, DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
     PEN,
@@ -67,14 +61,21 @@ from lightpen_app.steps.history.history_table import (
     X,
 )
 from lightpen_app.steps.history.page import HistoryPage
-from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
 from lightpen_app.widgets.fields import DateField
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.comparisons.selection_panel import SelectionPanel
+from lightpen_app_extensions.comparisons.service import ComparisonsService
 from lightpen_app_extensions.report.control import PrintReportWindow
 from lightpen_app_extensions.report.service import ReportService
+from lightpen_extensions.comparisons.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
+from lightpen_extensions.comparisons.records import verification_record
 from lightpen_extensions.plant.server import Replicator
 from lightpen_resources import languages
 
@@ -106,7 +107,8 @@ class Desk:
 
     def __init__(self, workbench: Workbench, qtbot: QtBot) -> None:
         self.workbench, self.qtbot = workbench, qtbot
-        services = VerifiedKinds(workbench), ReportService(workbench)
+        kinds = VerifiedKinds(workbench), ComparisonsService(workbench)
+        services = *kinds, ReportService(workbench)
         self.page = HistoryPage(workbench, services)
         self.notices: list[str] = []
         self.statuses: list[str] = []

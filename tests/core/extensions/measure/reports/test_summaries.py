@@ -4,24 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpen.comparisons.assessment import VERIFY_AGAIN, check
-from lightpen.comparisons.press_test import PressTest
-from lightpen.comparisons.records import (
-    repeatability_entries,
-    repeatability_text,
-    verification_record,
-)
-from lightpen.comparisons.repeatability import ControlLimits, Repeatability, TipEstimate
+from lightpen.archive.trends import ControlLimits, TipEstimate
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen_extensions.comparisons.assessment import VERIFY_AGAIN, check
 from lightpen_extensions.comparisons.commands.pens import (
     pen_health_entries,
     pen_health_text,
     press_test_text,
 )
 from lightpen_extensions.comparisons.pen_health import Growth, PenHealth, SwingOfPen
+from lightpen_extensions.comparisons.press_test import PressTest
+from lightpen_extensions.comparisons.records import (
+    repeatability_entries,
+    repeatability_text,
+    verification_record,
+)
+from lightpen_extensions.comparisons.repeatability import Repeatability
 from lightpen_extensions.measure.commands.measure import found_text, touches_text
 from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, RejectedFrame

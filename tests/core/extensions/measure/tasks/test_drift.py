@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.coverage import Decision, DecisionRule
 from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
 from lightpen_extensions.measure.tasks.drift import DRIFT, measure_drift
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 from lightpen_extensions.measure.tasks.task import Conditions

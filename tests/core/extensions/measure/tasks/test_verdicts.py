@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import VerificationAssessment, accepted
-from lightpen.comparisons.repeatability import Scatter
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.comparisons.assessment import VerificationAssessment, accepted
+from lightpen_extensions.comparisons.repeatability import Scatter
 from lightpen_extensions.measure.tasks import drift, fixed_point
 from lightpen_extensions.measure.tasks.fixed_point import TipEvidence, judged_tip
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint

@@ -12,10 +12,11 @@ from lightpen.archive.chains import Event, Kind, StoredEntry
 from lightpen.archive.growth import append, own_chain
 from lightpen.archive.history import EntryFilter
 from lightpen.archive.store import Database, open_file
-from lightpen.comparisons.repeatability import compare, repeatability_of, trend_of
+from lightpen.archive.trends import trend_of
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.names import Origin
 from lightpen.record.swings.header import Names
+from lightpen_extensions.comparisons.repeatability import compare, repeatability_of
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 WANTED = EntryFilter(pen="LP-04", tip="T-10")

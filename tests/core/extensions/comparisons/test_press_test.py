@@ -10,13 +10,13 @@ import pytest
 from benchmarks.station import GOOD, _drawn_pen, drawn_rig
 from msgspec.structs import replace as replace_struct
 
-from lightpen.comparisons.press_test import press_test
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.observation_files import Centers
 from lightpen.model.bending import ASSUMED, bending_on
 from lightpen.model.rigid import rig_of
+from lightpen_extensions.comparisons.press_test import press_test
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

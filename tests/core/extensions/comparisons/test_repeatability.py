@@ -1,16 +1,20 @@
-"""Tests of `lightpen.comparisons.repeatability`."""
+"""Tests of `lightpen_extensions.comparisons.repeatability`."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from lightpen.comparisons.records import repeatability_entries, repeatability_text
-from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
+from lightpen.archive.trends import TipEstimate
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.comparisons.records import (
+    repeatability_entries,
+    repeatability_text,
+)
+from lightpen_extensions.comparisons.repeatability import measure_repeatability
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
 LIMITS = VerificationLimits()

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.repeatability import Repeatability
 from lightpen.formats.own_json import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.messages import Message
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen_extensions.comparisons.assessment import VerificationAssessment
+from lightpen_extensions.comparisons.repeatability import Repeatability
 
 BY_SIMPLE_ACCEPTANCE = rule_in_words(VerificationLimits())
 

@@ -1,12 +1,18 @@
-"""Tests of `lightpen.comparisons.assessment`."""
+"""Tests of `lightpen_extensions.comparisons.assessment`."""
 
 import pytest
 
-from lightpen.comparisons.assessment import VERIFY_AGAIN, accepted, check, graded, worst
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.comparisons.assessment import (
+    VERIFY_AGAIN,
+    accepted,
+    check,
+    graded,
+    worst,
+)
 
 REASON = message("drift.too-few")
 

@@ -15,12 +15,6 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.assessment import (
-    BY_CHANCE,
-    VerificationAssessment,
-    accepted,
-    check,
-)
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
@@ -30,6 +24,12 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.bending import ASSUMED, MeasuredBending, measured_on
 from lightpen.model.coverage import COVERAGE_FACTOR, chi_square_quantile
+from lightpen_extensions.comparisons.assessment import (
+    BY_CHANCE,
+    VerificationAssessment,
+    accepted,
+    check,
+)
 
 PRESS_TEST = "press"  # kind of its record
 ALONG_PEN = 1  # axis of the pen frame

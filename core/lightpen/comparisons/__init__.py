@@ -1,1 +1,0 @@
-"""Calibrations compared: trend and repeatability of a tip, health of a pen."""
