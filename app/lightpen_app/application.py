@@ -276,7 +276,7 @@ def run(
         if swing is not None:
             open_swing = partial(wizard.workbench.run.open_requested.emit, swing)
             wizard.started.connect(open_swing)
-        status = shown(application, wizard, signals)
+        status = shown_until_closed(application, wizard, signals)
     return ended(wizard, status)
 
 
@@ -295,7 +295,7 @@ def has_display() -> bool:
     return any(os.environ.get(name) for name in names)
 
 
-def shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
+def shown_until_closed(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
     """Show the window until it closes; return the exit status."""
     signals.came.connect(lambda: _end(application, wizard))
     wizard.crash_hook.install()

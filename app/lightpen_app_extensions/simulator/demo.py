@@ -32,7 +32,7 @@ from lightpen_app.application import (
     ended,
     has_display,
     make_application,
-    shown,
+    shown_until_closed,
 )
 from lightpen_app.face import DemoStep, Service
 from lightpen_app.faced import Face
@@ -215,7 +215,7 @@ def run_demo(faces: Sequence[Face], simulator: Simulator) -> int:
             demo.ended.connect(partial(_print_tip, wizard.workbench.run))
             demo.ended.connect(wizard.window.close_unasked)
         wizard.started.connect(demo.start)
-        status = shown(application, wizard, signals)
+        status = shown_until_closed(application, wizard, signals)
         if not is_seen and not demo.is_accepted:
             status = status or 1
     return ended(wizard, status)
