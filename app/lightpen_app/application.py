@@ -295,7 +295,9 @@ def has_display() -> bool:
     return any(os.environ.get(name) for name in names)
 
 
-def shown_until_closed(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
+def shown_until_closed(
+    application: QApplication, wizard: Wizard, signals: EndSignals
+) -> int:
     """Show the window until it closes; return the exit status."""
     signals.came.connect(lambda: _end(application, wizard))
     wizard.crash_hook.install()
