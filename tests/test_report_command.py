@@ -9,12 +9,10 @@ import pytest
 
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.opened_files import InputFile
 from lightpen.formats.own_json import record_bytes, record_heading
 from lightpen.local_time import local_now
-from lightpen.record.folder import read_verification
-from lightpen_app_extensions.report.reporting import write_report
-from lightpen_app_extensions.report.verification import verification_print_report
+from lightpen_app_extensions.report.command import write_report
+from lightpen_app_extensions.report.content import print_report_of, read_content
 from lightpen_extensions.comparisons.assessment import (
     USE_TIP,
     VERIFY_AGAIN,
@@ -76,12 +74,7 @@ def test_a_verification_is_put_on_paper(
 
     assert outcome.returncode == 0, outcome.stderr
     assert out.read_bytes().startswith(b"%PDF-1.4")
-    content, file = verification.read_bytes(), InputFile(verification, "0" * 64)
-    report = verification_print_report(
-        InputFile(verification, file.sha256, content),
-        read_verification(content, verification),
-        None,
-    )
+    report = print_report_of(read_content(verification, None))
     assert report.margins.badges == ("SIMULATED", "CHECK")
     assert report.margins.subject == "Pen LP-04, tip T-10, drift"
 

@@ -1,4 +1,7 @@
-"""The plots of a calibration, drawn by the plots of the window."""
+"""The plots of a report, drawn by the plots of the window."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication
@@ -7,37 +10,19 @@ from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plots import Curve
-from lightpen_app.widgets.result_plots import (
-    ArrowPlot,
-    BarPlot,
-    BudgetPlot,
-    MarkPlot,
-    PosturePlot,
-)
-from lightpen_app_extensions.report.reestimated import ReestimatedPoses
+from lightpen_app.widgets.result_plots import ArrowPlot, BarPlot, BudgetPlot, MarkPlot
 
 translate = QCoreApplication.translate
 
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
 
 
-def charts_of(
-    calibration: CalibrationRecord, reestimated: ReestimatedPoses | None
-) -> dict[str, Figure]:
-    """Return the plots by their names in the template.
-
-    Some need the reestimated images.
-    """
-    plots = {
+def charts_of(calibration: CalibrationRecord) -> dict[str, Figure]:
+    """Return the plots by their names in the template."""
+    return {
         "budget_plot": _budget(calibration),
         "misfits": _misfits(calibration),
         "led_plot": _leds(calibration),
-    }
-    if reestimated is None:
-        return plots
-    return plots | {
-        "postures": _postures(reestimated),
-        "residuals": _residuals(reestimated),
     }
 
 
@@ -49,7 +34,10 @@ def _misfits(calibration: CalibrationRecord) -> Figure:
     heights = np.where(np.isfinite(misfits), np.minimum(misfits, top), top)
     names = translate("paper", "included"), translate("paper", "excluded")
     plot = MarkPlot(
-        Axes(translate("paper", "RMS residual per image / px"), _image_number()),
+        Axes(
+            translate("paper", "RMS residual per image / px"),
+            translate("paper", "image"),
+        ),
         [Curve(name, name) for name in names],
     )
     parts = (np.where(part, heights, np.nan) for part in (used, ~used))
@@ -90,22 +78,25 @@ def _budget(calibration: CalibrationRecord) -> Figure:
     return plot
 
 
-def _residuals(reestimated: ReestimatedPoses) -> Figure:
-    """Return the residuals as enlarged arrows at their image positions."""
-    plot = ArrowPlot(Axes(""))
-    plot.set_data(None, reestimated.points, reestimated.residuals)
-    title = translate("paper", "Residuals over the image \xd7 {0}")
-    plot.set_axes(Axes(title.format(f"{plot.scale():g}"), "x / px", "y / px"))
-    return plot
-
-
-def _postures(reestimated: ReestimatedPoses) -> Figure:
-    """Return the plot of the pen tilts from above, with the camera below."""
-    title = translate("paper", "Postures: tilt / \xb0")
-    plot = PosturePlot(Axes(title, translate("paper", "towards the camera")))
-    plot.set_data(reestimated.tilts, reestimated.directions)
-    return plot
-
-
-def _image_number() -> str:
-    return translate("paper", "image")
+def points_plot(
+    touches: Sequence[Mapping[str, Any]],
+) -> tuple[dict[str, Figure], dict[str, Any]]:
+    """Return a plot of all points with their deviations, from the flattest side."""
+    points = np.array([each["point_cam_mm"] for each in touches])
+    off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    if len(axes) < 2:
+        return {}, {"n_points": None}
+    flat = (points - middle) @ axes[:2].T
+    plot = ArrowPlot(Axes("", "mm", "mm"))
+    plot.set_data(None, flat, off @ axes[:2].T)
+    plot.mark(flat)
+    names = np.array([each["feature"] for each in touches])
+    each = list(dict.fromkeys(names.tolist()))
+    plot.set_labels(np.array([flat[names == n].mean(axis=0) for n in each]), each)
+    return {"points": plot}, {
+        "n_points": len(points),
+        "enlargement": plot.scale(),
+        "largest_deviation": float(np.linalg.norm(off, axis=1).max()),
+    }

@@ -1,11 +1,8 @@
 """Opens the report of a result file in its own window."""
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, TypeVar
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
@@ -13,26 +10,7 @@ from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
 from PySide6.QtWidgets import QDialog, QGraphicsView, QWidget
 from typing_extensions import override
 
-from lightpen.archive.logbook import entry_of_file
 from lightpen.formats.files import write_whole
-from lightpen.formats.opened_files import InputFile, with_content
-from lightpen.local_time import local_now
-from lightpen.record.calibrations import (
-    CalibrationFile,
-    TracedItem,
-    certified_values,
-    read_calibration,
-    traced_items,
-    with_status,
-)
-from lightpen.record.folder import (
-    StoredVerification,
-    data_folder_of_verification,
-    read_verification,
-)
-from lightpen.record.library.entered_files import EntryPlace
-from lightpen.record.library.tip_library import Library, read_library
-from lightpen.record.swings.header import Names
 from lightpen_app.face import ReportPrinter
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
@@ -43,62 +21,14 @@ from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, LatestJob, Report
-from lightpen_app_extensions.report.pages import A4, PrintReport, paint_on, pdf_of
-from lightpen_app_extensions.report.reestimated import (
-    ReestimatedPoses,
-    reestimate_poses,
+from lightpen_app_extensions.report.content import (
+    ReportContent,
+    print_report_of,
+    read_content,
 )
+from lightpen_app_extensions.report.pages import A4, PrintReport, paint_on, pdf_of
 
-T = TypeVar("T")
 PATIENCE_MS = 300  # before the progress of saving is shown
-
-
-@dataclass(frozen=True)
-class ReportContent:
-    """Content of the report of a calibration."""
-
-    calibration_file: CalibrationFile
-    # Its images, where the file holds enough for that.
-    reestimated: ReestimatedPoses | None
-    entered: EntryPlace | None  # archive entry of the calibration
-
-
-def read_calibration_file(file: Path) -> ReportContent:
-    """Read the content of the report of a calibration.
-
-    Raises `FileError` if the calibration is not the one that was entered, `UsageError`
-    if the file holds none, or lacks content of the report.
-    """
-    calibration_file = with_status(read_calibration(file), local_now())
-    reestimated = reestimate_poses(calibration_file.calibration)
-    return ReportContent(
-        calibration_file, reestimated, entry_of_file(file, calibration_file.sha256)
-    )
-
-
-class KeptVerification(NamedTuple):
-    """A verification on the disk: its file with the content, and its archive entry."""
-
-    file: InputFile
-    done: StoredVerification
-    entered: EntryPlace | None
-    traced: tuple[TracedItem, ...] = ()
-
-
-def read_kept_verification(path: Path) -> KeptVerification:
-    """Read the content of the report of an archived verification."""
-    file = with_content(path)
-    done = read_verification(file.content or b"", path)
-    data = data_folder_of_verification(path)
-    library = Library() if data is None else read_library(data)
-    names = Names(done.station, done.operator, done.pen, done.tip)
-    certified = certified_values(json.loads(file.content or b"{}"))
-    return KeptVerification(
-        file,
-        done,
-        entry_of_file(path, file.sha256),
-        traced_items(library, names, done.camera_serials, certified),
-    )
 
 
 class PrintReportControl(ReportPrinter):
@@ -114,44 +44,21 @@ class PrintReportControl(ReportPrinter):
 
     @override
     def show(self, find: Callable[[], Path]) -> None:
-        self._read(lambda: read_calibration_file(find()), self._show)
+        laboratory = self._place.settings.laboratory()
+        read = partial(read_content, laboratory=laboratory)
+        self._reading.start(lambda _: read(find()), self._open, self.failed)
 
     @override
     def show_verification(self, path: Path) -> None:
-        self._read(lambda: read_kept_verification(path), self._show_verification)
-
-    def _read(self, read: Callable[[], T], show: Callable[[T], None]) -> None:
-        self._reading.start(lambda _: read(), show, self.failed)
+        self.show(lambda: path)
 
     @override
     def shut_down(self) -> None:
         self._reading.cancel()
 
-    def _show(self, found: ReportContent) -> None:
-        # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app_extensions.report.pages import print_report_of, report_stem
-
-        report = print_report_of(
-            found.calibration_file,
-            found.reestimated,
-            found.entered,
-            self._place.settings.laboratory(),
-        )
-        self._open(report, report_stem(found.calibration_file))
-
-    def _show_verification(self, found: KeptVerification) -> None:
-        from lightpen_app_extensions.report.verification import (
-            verification_print_report,
-            verification_stem,
-        )
-
-        stem = verification_stem(found.file.path, found.done)
-        laboratory = self._place.settings.laboratory()
-        self._open(verification_print_report(*found, laboratory), stem)
-
-    def _open(self, report: "PrintReport", stem: str) -> None:
-
-        window = PrintReportWindow(report, self._place, stem, self._page)
+    def _open(self, content: ReportContent) -> None:
+        report = print_report_of(content)
+        window = PrintReportWindow(report, self._place, content.stem, self._page)
         window.saved.connect(self.saved)
         window.failed.connect(self.failed)
         window.show()

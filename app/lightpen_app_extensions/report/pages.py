@@ -39,16 +39,8 @@ from PySide6.QtGui import (
 )
 from typing_extensions import override
 
-from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.names import Laboratory, Origin
-from lightpen.record.calibrations import CalibrationFile
-from lightpen.record.exports import export_stem
-from lightpen.record.library.entered_files import EntryPlace
-from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.look.words import BREAK
-from lightpen_app_extensions.report.calibration import calibration_parts, status_words
-from lightpen_app_extensions.report.reestimated import ReestimatedPoses
 from lightpen_app_extensions.report.template import (
     ANCHOR,
     MM,
@@ -59,7 +51,6 @@ from lightpen_app_extensions.report.template import (
     PrintSize,
     print_font,
     printed_text,
-    record_number,
 )
 
 translate = QCoreApplication.translate
@@ -290,22 +281,6 @@ A4 = QPageLayout(
 )
 
 
-def print_report_of(
-    calibration_file: CalibrationFile,
-    reestimated: ReestimatedPoses | None,
-    entered: EntryPlace | None = None,
-    laboratory: Laboratory | None = None,
-) -> PrintReport:
-    """Return the report of a calibration, in the selected language.
-
-    Without the reestimated images some plots are left out. ``entered`` is the archive
-    entry of the calibration, the laboratory where it was made.
-    """
-    parts = calibration_parts(calibration_file, reestimated, entered, laboratory)
-    author = calibration_file.names.operator
-    return PrintReport(author, _margins(calibration_file), parts)
-
-
 def pdf_of(
     report: PrintReport, progress: Callable[[float], None] = lambda fraction: None
 ) -> bytes:
@@ -345,38 +320,3 @@ def paint_on(
             progress(number / document.pageCount())
     finally:
         painter.end()
-
-
-def report_stem(calibration_file: CalibrationFile) -> str:
-    """Return the beginning of the default file name."""
-    if calibration_file.accepted is None:
-        return calibration_file.path.stem
-    return export_stem(
-        calibration_file.names, calibration_file.accepted, calibration_file.origin
-    )
-
-
-def _margins(calibration_file: CalibrationFile) -> Margins:
-    names = calibration_file.names
-    items = (each or "\u2013" for each in (names.pen, names.tip, names.cone))
-    subject = translate("paper", "Pen {0}, tip {1}, cone {2}").format(*items)
-    foot = translate("paper", "SHA-256 of the JSON file: {0}")
-    return Margins(
-        title=translate("paper", "Calibration report"),
-        subject=subject,
-        number=record_number(calibration_file.sha256),
-        badges=_badges(calibration_file),
-        foot=foot.format(calibration_file.sha256),
-    )
-
-
-def _badges(calibration_file: CalibrationFile) -> tuple[str, ...]:
-    """Return the badges: origin, grade, acceptance, and status of pen and tip."""
-    badges = []
-    if calibration_file.origin is not Origin.LIVE:
-        badges.append(origin_text(calibration_file.origin))
-    if calibration_file.grade is not Grade.PASS:
-        badges.append(grade_text(calibration_file.grade))
-    if calibration_file.accepted is None:
-        badges.append(translate("paper", "NOT ACCEPTED"))
-    return (*badges, *status_words(calibration_file))

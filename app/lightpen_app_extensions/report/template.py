@@ -4,45 +4,60 @@ A language has a file, a kind of report a section of it. Its paragraphs are apar
 blank lines, and begin with a mark of their size or with what they show:
 
     :facts COLUMNS       names and values, a line each
-    :table NAME WIDTHS   columns, > right-aligned, titles, and rows below those of NAME
-    :small NAME WIDTHS   the same in small letters
+    :table WIDTHS        columns, > right-aligned, titles, and rows below
+    :small WIDTHS        the same in small letters
     :charts HEIGHT NAMES plots side by side, mm high
     :draw NAME           what is made by the program
     :include SECTION     another section
+    :sign                fields for signatures
     :keep, :free         what is between stands on one page
 
-A line is left out if one of its values is None; an empty value is a condition that is
-met, or a fact that is not stated. What is filled in becomes HTML, as `QTextDocument`
-shows it.
+A line that begins with ``@PATH`` is repeated for each item of a list, which is then
+``it``. A value is the path to it in the record, with how it is shown and what is shown
+without it: ``{names.pen}``, ``{sigma_px:.4f px}``, ``{due?not stated}``:
+
+    .4f, g, %Y ...       as Python formats it, and a unit
+    by PATH              to the digits that this uncertainty warrants
+    =TEXT, !TEXT         nothing; the line is left out if the value is not TEXT, or is
+    *TEXT                makes the line bold if the value is TEXT
+
+A line is left out if one of its values is not there. A vector takes a cell for each of
+its values. What is filled in becomes HTML, as `QTextDocument` shows it.
 """
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import IntEnum
 from functools import cache
 from html import escape
+from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QPoint
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPicture
 
-from lightpen.model.names import Laboratory
-from lightpen.record.calibrations import TracedItem
-from lightpen.record.library.entered_files import EntryPlace
-from lightpen.record.library.tip_library import ItemKind
-from lightpen_app.look.languages import OWN_NAME, listed, own_name
+from lightpen.detection.reasons import Reason
+from lightpen.formats.own_json import StoredMessage
+from lightpen.messages import Message
+from lightpen_app.look.languages import OWN_NAME, own_name, worded
+from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.theme import LIGHT, TextSize, font, palette_of, scaled
+from lightpen_app.look.words import decimals_for, number_text
 from lightpen_app.widgets.figure import Figure
 from lightpen_resources import RESOURCES
 
 translate = QCoreApplication.translate
 
 REPORTS = RESOURCES / "reports"
-FIELD = re.compile(r"\{(\w+)\}")
+FIELD = re.compile(r"\{([\w.]+)(?::([^}?]*))?(?:\?([^}]*))?\}")
+DECIMALS = re.compile(r"\.(\d)f")
 SECTION = re.compile(r"^\[(\w+)\]$", re.MULTILINE)
-BOLD = "* "
+BOLD, EACH, BAR = "* ", "@", "\0"
 MARKS = {  # of a paragraph: its tag and its class
     "= ": ("h1", ""),
     "~ ": ("p", "lead"),
@@ -113,17 +128,6 @@ class Piece:
     html: str
     keeps: bool = False  # whether the beginning of the next is kept on the same page
     plots: Mapping[str, Drawn] = field(default_factory=dict)  # by names in the HTML
-
-
-@dataclass(frozen=True)
-class Content:
-    """What a template is filled with, by the names in it."""
-
-    texts: Mapping[str, str | None]
-    tables: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
-    strong: Mapping[str, Sequence[int]] = field(default_factory=dict)  # bold rows
-    charts: Mapping[str, Figure] = field(default_factory=dict)
-    drawn: Mapping[str, Sequence[Piece]] = field(default_factory=dict)
 
 
 def print_font(size: float, *, bold: bool = False) -> QFont:
@@ -223,15 +227,23 @@ def charts(plots: Mapping[str, Figure], height: float) -> tuple[Piece, ...]:
     return (replace(part, plots=made),)
 
 
-def signatures(by: str) -> Piece:
-    """Return the fields for signatures, the first with a title."""
-    below = markup(translate("paper", "Name, date, signature"))
-    names = "".join(
+def signatures(names: Sequence[str], below: str) -> Piece:
+    """Return the fields for signatures, with a title each."""
+    cells = "".join(
         f'<td class="signed" width="44%"><b>{markup(name)}</b></td><td></td>'
-        for name in (by, translate("paper", "Checked by"))
+        for name in names
     )
-    fields = f'<td class="signature">{below}</td><td></td>' * 2
-    return _table_of("", [names, fields])[0]
+    fields = f'<td class="signature">{markup(below)}</td><td></td>' * len(names)
+    return _table_of("", [cells, fields])[0]
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a template is filled with."""
+
+    scope: Sequence[Any]  # objects that have the values; a name is of the first with it
+    charts: Mapping[str, Figure] = field(default_factory=dict)
+    drawn: Mapping[str, Sequence[Piece]] = field(default_factory=dict)
 
 
 def fill_template(section: str, content: Content) -> tuple[Piece, ...]:
@@ -249,19 +261,9 @@ def fill_template(section: str, content: Content) -> tuple[Piece, ...]:
     return tuple(parts)
 
 
-def condition(is_met: object) -> str | None:
-    """Return the value on which lines of a template depend."""
-    return "" if is_met else None
-
-
-def cells(texts: Iterable[str]) -> str:
-    """Return the text of several cells of a row."""
-    return " | ".join(texts)
-
-
 @cache
 def _sections(name: str) -> dict[str, str]:
-    """Return the sections of the language that calls itself by a name."""
+    """Return the sections of the template of a language, by its own name."""
     files = {own_name(file.stem): file for file in REPORTS.glob("*.txt")}
     _, *parts = SECTION.split(files[name].read_text(encoding="utf-8"))
     return {
@@ -281,119 +283,117 @@ def _parts(
             return fill_template(words[0], content)
         case ":draw":
             return content.drawn[words[0]]
+        case ":sign":
+            ((*names, below),) = _filled(lines, content.scope)
+            return [signatures(names, below)]
         case ":charts":
             there = {n: content.charts[n] for n in words[1:] if n in content.charts}
             return charts(there, float(words[0]) * MM)
         case ":facts":
-            n_columns, *name = words
-            rows = [row for each in name for row in content.tables[each]]
-            rows += [_cells(line, 1) for line in _filled(lines, content)]
             unstated = translate("paper", "not stated")
-            return facts(
-                [(name, text or unstated) for name, text in rows], int(n_columns)
-            )
+            named = [
+                (name, ", ".join(text) or unstated)
+                for name, *text in _filled(lines, content.scope)
+            ]
+            return facts(named, int(words[0]))
         case ":table" | ":small":
-            return _table(command[1:], words[0], words[1:], lines, content)
+            titles, *rows = _filled(lines, content.scope)
+            strong = [i for i, row in enumerate(rows) if row[0].startswith(BOLD)]
+            rows = [[row[0].removeprefix(BOLD), *row[1:]] for row in rows]
+            return table(titles, words, rows, strong=strong, name=command[1:])
     if command.startswith(":"):
         raise ValueError(f"A template must have known commands, got {command}.")
     mark = next((each for each in MARKS if stanza.startswith(each)), "")
-    texts = list(_filled(stanza.removeprefix(mark).splitlines(), content))
+    lines = stanza.removeprefix(mark).splitlines()
+    texts = [", ".join(each) for each in _filled(lines, content.scope, "\n")]
+    if stanza.startswith(EACH):
+        return map(paragraph, texts)
     return [paragraph(" ".join(texts), mark)] if texts else ()
 
 
-def _table(
-    kind: str, name: str, widths: Sequence[str], lines: Sequence[str], content: Content
-) -> tuple[Piece, ...]:
-    """Return a table of the rows of its name, and of lines below its titles."""
-    title, *below = lines
-    rows, strong = list(content.tables.get(name, ())), [*content.strong.get(name, ())]
-    for line in _filled(below, content):
-        if line.startswith(BOLD):
-            strong.append(len(rows))
-        rows.append(_cells(line.removeprefix(BOLD)))
-    return table(_cells(title), widths, rows, strong=strong, name=kind)
+class _MissingError(Exception):
+    """A value of a line is not there."""
 
 
-def _filled(lines: Iterable[str], content: Content) -> Iterator[str]:
-    """Yield the lines of which all values are there, with these."""
+def _filled(
+    lines: Iterable[str], scope: Sequence[Any], bar: str = "|"
+) -> Iterator[list[str]]:
+    """Yield the cells of lines of which all values are there."""
     for line in lines:
-        if all(content.texts[name] is not None for name in FIELD.findall(line)):
-            yield FIELD.sub(lambda found: content.texts[found[1]] or "", line)
+        named = [scope]
+        if line.startswith(EACH):
+            path, line = line.removeprefix(EACH).split(" ", 1)
+            items = enumerate(_value(path, scope) or (), 1)
+            named = [({"it": each, "number": i}, *scope) for i, each in items]
+        for names in named:
+            with suppress(_MissingError):
+                cells = [_text(each, names).strip() for each in line.split(bar)]
+                yield BAR.join(cells).split(BAR)
 
 
-def _cells(line: str, n_breaks: int = -1) -> list[str]:
-    return [cell.strip() for cell in line.split("|", n_breaks)]
+def _text(line: str, scope: Sequence[Any]) -> str:
+    def shown(found: re.Match[str]) -> str:
+        path, form, instead = found.groups(default="")
+        value = _value(path, scope)
+        if form[:1] in ("=", "!", "*"):
+            is_it = str("" if value in (None, (), []) else value) == form[1:]
+            if form[0] == "*":
+                return BOLD if is_it else ""
+            if is_it is not (form[0] == "="):
+                raise _MissingError
+            return ""
+        text = _formatted(value, form, scope)
+        if text is None and found[3] is None:
+            raise _MissingError
+        return text or instead
+
+    return FIELD.sub(shown, line)
 
 
-NUMBER_LENGTH = 12  # digits of the SHA-256 that name a record
+def _value(path: str, scope: Sequence[Any]) -> Any:
+    """Return what a path leads to; None if it ends early."""
+    first, *names = path.split(".")
+    for each in scope:
+        if first in each if isinstance(each, Mapping) else hasattr(each, first):
+            value = _part(each, first)
+            for name in names:
+                value = None if value is None else _part(value, name)
+            return value
+    raise KeyError(f"A template must have known names, got {first}.")
 
 
-def zoned_moment_text(moment: datetime) -> str:
-    """Return a moment with the time zone that it was written in."""
-    return moment.isoformat(sep=" ", timespec="seconds")
+def _part(of: Any, name: str) -> Any:
+    if isinstance(of, Mapping):
+        return of.get(name)
+    return of[int(name)] if name.isdigit() else getattr(of, name)
 
 
-def environment_texts(
-    temperature_c: float | None, humidity_percent: float | None
-) -> dict[str, str | None]:
-    """Return temperature of the pen and humidity of the room."""
-    unknown = translate("paper", "not measured")
-    temperature = unknown if temperature_c is None else f"{temperature_c:.1f} \xb0C"
-    humidity = unknown if humidity_percent is None else f"{humidity_percent:g} %"
-    return {"temperature": temperature, "humidity": humidity}
+def _formatted(value: Any, form: str, scope: Sequence[Any]) -> str | None:
+    """Return a value, or the values of a vector; None if one of them is missing."""
+    is_vector = isinstance(value, (list, tuple, np.ndarray))
+    values, forms = value if is_vector else [value], [form]
+    if form.startswith("by "):
+        sizes = np.array(_value(form[3:], scope), dtype=np.float64)
+        forms = [f".{decimals_for(each)}f" for each in np.ravel(sizes).tolist()]
+    texts = [_plain(x, forms[i % len(forms)]) for i, x in enumerate(values)]
+    return None if None in texts else BAR.join(map(str, texts))
 
 
-def laboratory_texts(
-    laboratory: Laboratory | None, traced: Sequence[TracedItem]
-) -> dict[str, str | None]:
-    """Return laboratory, place and procedure, and whether nothing is traced."""
-    known = laboratory or Laboratory()
-    place = (known.street, f"{known.post_code} {known.city}".strip(), known.country)
-    return {
-        "laboratory": known.name,
-        "place": listed(filter(None, place)),
-        "procedure": known.procedure,
-        "untraced": condition(not traced),
-    }
-
-
-def traced_rows(traced: Sequence[TracedItem]) -> list[tuple[str, ...]]:
-    """Return the certificates of the equipment used."""
-    kinds = {
-        ItemKind.CAMERA: translate("paper", "Camera (intrinsics)"),
-        ItemKind.PEN: translate("paper", "Pen (LED measurement)"),
-        ItemKind.TIP: translate("paper", "Probe tip (ball)"),
-        ItemKind.CONE: translate("paper", "Cone"),
-        ItemKind.REFERENCE: translate("paper", "Reference"),
-    }
-    unstated = translate("paper", "not stated")
-    rows = []
-    for each in traced:
-        item = each.item
-        known = (
-            ("", None, None)
-            if item is None
-            else (item.certificate, item.certified, item.due)
-        )
-        rows.append((kinds[each.kind], each.id, *(str(k or unstated) for k in known)))
-    return rows
-
-
-def proof_texts(
-    name: str, sha256: str, entered: EntryPlace | None
-) -> dict[str, str | None]:
-    """Return the hashes that bind the report to its file."""
-    return {
-        "file": name,
-        "sha256": sha256,
-        "entry": translate("paper", "none") if entered is None else f"{entered.number}",
-        "entry_sha256": None if entered is None else entered.sha256,
-        "chain": None if entered is None else entered.chain,
-    }
-
-
-def record_number(sha256: str) -> str:
-    """Return the number of a report, by the hash of its file."""
-    digits = sha256[:NUMBER_LENGTH]
-    number = " ".join(digits[i : i + 4] for i in range(0, NUMBER_LENGTH, 4))
-    return translate("paper", "No. {0}").format(number)
+def _plain(value: Any, form: str) -> str | None:
+    form, _, unit = form.partition(" ")
+    match value:
+        case Reason():
+            return reason_text(value)
+        case Message() | StoredMessage():
+            return worded(value)
+        case datetime():
+            return f"{value:{form}}" if form else value.isoformat(" ", "seconds")
+        case Mapping():
+            return ", ".join(f"{k} {v}" for k, v in value.items() if v)
+        case float() if math.isnan(value):
+            return None
+        case int() | float() if form:
+            places = DECIMALS.fullmatch(form)
+            text = number_text(value, int(places[1])) if places else f"{value:{form}}"
+            return f"{text} {unit}".strip()
+    return None if value is None else str(value)

@@ -8916,18 +8916,6 @@ needed</source>
         <translation>各来源的 U (k = 2)，最弱方向 / mm</translation>
     </message>
     <message>
-        <source>Residuals over the image × {0}</source>
-        <translation>图像上的残差 × {0}</translation>
-    </message>
-    <message>
-        <source>Postures: tilt / °</source>
-        <translation>姿态：倾角 / °</translation>
-    </message>
-    <message>
-        <source>towards the camera</source>
-        <translation>朝向相机</translation>
-    </message>
-    <message>
         <source>image</source>
         <translation>图像</translation>
     </message>
@@ -8968,36 +8956,12 @@ needed</source>
         <translation>该测头已被接受。理由：{0}</translation>
     </message>
     <message>
-        <source>Station</source>
-        <translation>工位</translation>
-    </message>
-    <message>
-        <source>Cone</source>
-        <translation>锥孔</translation>
-    </message>
-    <message>
         <source>no</source>
         <translation>未接受</translation>
     </message>
     <message>
         <source>Practice: not used for any pen.</source>
         <translation>练习：不用于任何光笔。</translation>
-    </message>
-    <message>
-        <source>Camera (intrinsics)</source>
-        <translation>相机（内参）</translation>
-    </message>
-    <message>
-        <source>Pen (LED measurement)</source>
-        <translation>光笔（LED 测量）</translation>
-    </message>
-    <message>
-        <source>Probe tip (ball)</source>
-        <translation>测头（测球）</translation>
-    </message>
-    <message>
-        <source>Reference</source>
-        <translation>标准器</translation>
     </message>
     <message>
         <source>practice</source>
@@ -9016,20 +8980,12 @@ needed</source>
         <translation>有效</translation>
     </message>
     <message>
-        <source>not measured</source>
-        <translation>未测量</translation>
-    </message>
-    <message>
         <source>assumed</source>
         <translation>假定</translation>
     </message>
     <message>
         <source>outlier</source>
         <translation>离群值</translation>
-    </message>
-    <message>
-        <source>Rig</source>
-        <translation>相机组</translation>
     </message>
     <message>
         <source>Camera</source>
@@ -9042,26 +8998,6 @@ needed</source>
     <message>
         <source>Calibrated by</source>
         <translation>标定人</translation>
-    </message>
-    <message>
-        <source>Checked by</source>
-        <translation>核验人</translation>
-    </message>
-    <message>
-        <source>Name, date, signature</source>
-        <translation>姓名、日期、签字</translation>
-    </message>
-    <message>
-        <source>joint adjustment of all images</source>
-        <translation>全部图像整体平差</translation>
-    </message>
-    <message>
-        <source>two-stage, as published by S. Liu et al. (2013)</source>
-        <translation>两步法，S. Liu 等 (2013)</translation>
-    </message>
-    <message>
-        <source>none</source>
-        <translation>无</translation>
     </message>
     <message>
         <source>not stated</source>
@@ -9086,14 +9022,6 @@ needed</source>
     <message>
         <source>Pen {0}, tip {1}, {2}</source>
         <translation>光笔 {0}，测头 {1}，{2}</translation>
-    </message>
-    <message>
-        <source>Item under verification</source>
-        <translation>被验证物品</translation>
-    </message>
-    <message>
-        <source>Figures, as the JSON file names them</source>
-        <translation>数值（名称同 JSON 文件）</translation>
     </message>
     <message>
         <source>yes</source>

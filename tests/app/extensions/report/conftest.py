@@ -23,15 +23,14 @@ from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.header import Names
 from lightpen_app.look.words import BREAK
+from lightpen_app_extensions.report.content import ReportContent, print_report_of
 from lightpen_app_extensions.report.pages import (
     PAGE_HEIGHT,
     PAGE_WIDTH,
     PrintReport,
     lay_out,
     paint_page,
-    print_report_of,
 )
-from lightpen_app_extensions.report.reestimated import reestimate_poses
 
 SVG = "{http://www.w3.org/2000/svg}text"
 
@@ -100,8 +99,7 @@ def printed(tmp_path: Path) -> Callable[..., PrintReport]:
         calibration_file = replace(
             read_calibration(path), traced=traced, library_status=status
         )
-        poses = reestimate_poses(calibration_file.calibration)
-        return print_report_of(calibration_file, poses, entered, laboratory)
+        return print_report_of(ReportContent(calibration_file, entered, laboratory))
 
     return put_on_paper
 

@@ -243,20 +243,6 @@ def test_a_character_that_no_font_has_is_reported_by_its_number(
     assert "U+" not in plain
 
 
-def test_it_is_whole_without_the_curves_where_the_file_does_not_hold_enough(
-    result: Result, stated: dict[str, Any], printed: Printed, words: Words
-) -> None:
-    other = replace(result, calibration=record_of({**stated, "rig": {"cameras": []}}))
-
-    reported = " ".join(" ".join(page) for page in words(printed(other)))
-
-    assert (
-        "Postures and residuals are plotted only for one camera "
-        "and one cone, and for complete files."
-    ) in reported
-    assert "End of report" in reported
-
-
 def test_the_camera_is_named_whose_parameters_are_listed(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:
