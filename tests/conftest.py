@@ -148,11 +148,10 @@ def no_broadcast() -> Iterator[None]:
     if find_spec("lightpen_extensions.drivers") is None:  # a tree of main alone
         yield
         return
-    from lightpen_extensions.drivers import aravis, basler
+    from lightpen_extensions.drivers import aravis
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(aravis, "_listed", lambda library: range(0))
-        patch.setattr(basler, "LAYERS", ("BaslerCamEmu",))
         yield
 
 
@@ -240,16 +239,6 @@ def genicam() -> "SourcePlace":
     from lightpen.cameras.source import SourcePlace
 
     return SourcePlace("1", str(Path(genicam.__file__).with_name("viky.cti")))
-
-
-@pytest.fixture
-def basler(monkeypatch: pytest.MonkeyPatch) -> "SourcePlace":
-    """Return the camera that pylon emulates."""
-    from lightpen.cameras.source import SourcePlace
-
-    monkeypatch.setenv("PYLON_CAMEMU", "1")
-    require_library("basler")
-    return SourcePlace("0815-0000")
 
 
 @pytest.fixture(scope="session")

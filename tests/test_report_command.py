@@ -17,8 +17,8 @@ from lightpen_extensions.comparisons.assessment import (
     USE_TIP,
     VERIFY_AGAIN,
     VerificationAssessment,
+    verification_record,
 )
-from lightpen_extensions.comparisons.records import verification_record
 from lightpen_program.extensions import main
 
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}

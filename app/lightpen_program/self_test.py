@@ -168,7 +168,7 @@ MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
            "PySide6.QtSvg", "pyqtgraph", "lightpen.cli",
            "lightpen_app.application")  # fmt: skip
 # Drive cameras, reach an archive on a server, and read workbooks.
-OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "python_calamine")
+OPTIONAL = ("harvesters.core", "psycopg", "python_calamine")
 
 
 def test_program(file: Path) -> int:

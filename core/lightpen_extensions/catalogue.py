@@ -245,8 +245,6 @@ MESSAGES = {
     "repeatability.twice": "{one} and {other} hold the same tip to the last digit. Give each calibration once.",
     "aravis.absent": "Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: apt-get install libaravis-0.8-0",
     "source.aravis": "GigE and USB3 Vision (Aravis)",
-    "basler.absent": "pypylon is not installed. It drives Basler cameras: {python} -m pip install pypylon",
-    "basler.not-part": "pypylon is not part of this program. Basler cameras also work as GenICam cameras, with the GenTL producer of pylon.",
     "camera.no-image": "No image from camera {serial} for {waited:.1f} s. Check cable and trigger.",
     "camera.incomplete": "Image {seq} of camera {serial} was incomplete and was discarded. Check cable and network.",
     "camera.cannot-be-set": "The {what} of this camera cannot be set. Use the aperture of the lens.",

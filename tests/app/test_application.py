@@ -62,7 +62,7 @@ application.make_pages = pages
 sys.exit(application.run(faces(), None))
 """
 LATER = {
-    *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),
+    *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters"),
     *(
         "lightpen_app_extensions.simulator.demo",
         "lightpen_app_extensions.discover.window",

@@ -27,14 +27,12 @@ from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.comparisons.records import (
-    repeatability_entries,
-    verification_record,
-)
+from lightpen_extensions.comparisons.assessment import verification_record
 from lightpen_extensions.comparisons.repeatability import (
     Comparison,
     Repeatability,
     compare,
+    repeatability_entries,
     repeatability_of,
 )
 

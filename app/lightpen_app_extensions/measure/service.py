@@ -5,11 +5,11 @@ from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication, QObject, Signal
 from typing_extensions import override
 
-from lightpen.archive.chains import Event
 from lightpen.record.folder import VERIFIED
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.face import (
@@ -46,6 +46,9 @@ from lightpen_extensions.measure.tasks.registry import ALL_TASKS, task_of
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_extensions.measure.workflow import VerificationRunner
 from lightpen_extensions.simulator.hand import SimulatedOperator
+
+if TYPE_CHECKING:
+    from lightpen.archive.chains import Event  # takes long to be imported
 
 KEY = "measure"
 LONGEST = 16  # characters of a name
@@ -156,7 +159,7 @@ class MeasureService(Service):
         return (ReadinessItem("verify", name, self._reference_message(), action),)
 
     @override
-    def event_text(self, event: Event) -> str:
+    def event_text(self, event: "Event") -> str:
         kind = event.settings.get(VERIFIED)
         return next((worded(task.title) for task in ALL_TASKS if task.kind == kind), "")
 

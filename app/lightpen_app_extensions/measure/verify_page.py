@@ -28,12 +28,12 @@ from lightpen_app_extensions.measure.plan_panel import choose_plan
 from lightpen_app_extensions.measure.presenter import VerifyPresenter
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.comparisons.assessment import BY_SIMPLE_ACCEPTANCE
 from lightpen_extensions.comparisons.pen_health import (
     PenHealth,
     PenOverTime,
     read_pen_over_time,
 )
-from lightpen_extensions.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 
 LATEST = 8  # swings; the table has room for as many

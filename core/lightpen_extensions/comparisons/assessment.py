@@ -1,8 +1,9 @@
-"""Assessment of a verification: grade, main reason and next step."""
+"""Assessment of a verification: grade, main reason and next step; its record."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -11,10 +12,18 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
-from lightpen.formats.own_json import DamagedError, Vector, has_checksum, parse_own_json
+from lightpen.formats.own_json import (
+    DamagedError,
+    Vector,
+    has_checksum,
+    parse_own_json,
+    plain,
+    record_heading,
+)
+from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 from lightpen.model.coverage import COVERAGE_FACTOR, Decision, normal_quantile
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import VerificationLimits, rule_in_words
 
 USE_TIP = message("verification.use-tip")
 CALIBRATE_AGAIN = message("verification.calibrate-again")
@@ -24,10 +33,40 @@ BETTER_POSTURES = message("verification.better-postures")
 MORE_POINTS = message("verification.more-points")
 
 
+BY_SIMPLE_ACCEPTANCE = rule_in_words(VerificationLimits())
+TITLE, COLUMN = 24, 10  # characters
+
 BY_CHANCE = 0.01  # probability that no error looks significant: beyond 1.3 U
 RELEVANT = 0.25  # of a limit: a smaller difference does not matter, however certain
 
 WORST = (Grade.STEADY, Grade.SCALE, Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Coordinates (N, 3) of a point measured several times, mm."""
+
+    points: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        """Of each coordinate, (3,)."""
+        return np.asarray(self.points.mean(axis=0))
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation of each coordinate, (3,)."""
+        return np.asarray(self.points.std(axis=0, ddof=1))
+
+    @property
+    def range(self) -> FloatArray:
+        """Largest minus smallest of each coordinate, (3,)."""
+        return np.asarray(np.ptp(self.points, axis=0))
+
+    @property
+    def half_range(self) -> FloatArray:
+        """Half the largest minus the smallest of each coordinate, (3,)."""
+        return self.range / 2
 
 
 @dataclass(frozen=True)
@@ -112,3 +151,44 @@ def read_drift(path: Path) -> FloatArray:
     except DamagedError as error:
         raise FileError("verification.other-file", path=path, what=DRIFT) from error
     return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
+
+
+def verification_record(
+    kind: str,
+    entries: Mapping[str, Any],
+    assessment: VerificationAssessment | None,
+    limits: Mapping[str, float],
+    inputs: Mapping[str, Any],
+    rule: Message = BY_SIMPLE_ACCEPTANCE,
+) -> dict[str, Any]:
+    """Return the record of a verification of a kind, of its entries and input files.
+
+    The assessment is None of what is measured and not judged; the limits, mm, and the
+    rule are those that it was judged by.
+    """
+    record = {
+        **record_heading(local_now()),
+        "verification": kind,
+        "coverage_factor": COVERAGE_FACTOR,
+        "verdict": None
+        if assessment is None
+        else {
+            "grade": assessment.grade.value,
+            **plain(assessment.reason),
+            "next_step": assessment.next_step,
+            "decision_rule": str(rule),
+            "limits_mm": limits,
+        },
+        **entries,
+        "inputs": inputs,
+    }
+    return {name: plain(entry) for name, entry in record.items()}
+
+
+def verdict_lines(assessment: VerificationAssessment, rule: Message) -> list[str]:
+    """Return the lines of a verdict."""
+    return [
+        f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
+        f"             {assessment.next_step}",
+        f"             {rule}",
+    ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,48 +11,26 @@ from lightpen.archive.trends import ControlLimits, TipEstimate, control_limits, 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Change, change_since
-from lightpen.messages import message
+from lightpen.messages import Message, message
 from lightpen.model.coverage import COVERAGE_FACTOR, Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.comparisons.assessment import (
+    BY_SIMPLE_ACCEPTANCE,
     CALIBRATE_AGAIN,
+    COLUMN,
+    TITLE,
+    Scatter,
     VerificationAssessment,
     accepted,
     check,
     refused,
+    verdict_lines,
 )
 
 MIN_TIPS = 2
 ENOUGH_TIPS = 5  # for a verdict, and
 REPEAT_MORE = message("repeatability.repeat-more")
 USE_NEWEST = message("repeatability.use-newest")
-
-
-@dataclass(frozen=True, eq=False)
-class Scatter:
-    """Coordinates (N, 3) of a point measured several times, mm."""
-
-    points: FloatArray
-
-    @property
-    def mean(self) -> FloatArray:
-        """Of each coordinate, (3,)."""
-        return np.asarray(self.points.mean(axis=0))
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Standard deviation of each coordinate, (3,)."""
-        return np.asarray(self.points.std(axis=0, ddof=1))
-
-    @property
-    def range(self) -> FloatArray:
-        """Largest minus smallest of each coordinate, (3,)."""
-        return np.asarray(np.ptp(self.points, axis=0))
-
-    @property
-    def half_range(self) -> FloatArray:
-        """Half the largest minus the smallest of each coordinate, (3,)."""
-        return self.range / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,3 +137,69 @@ def repeatability_of(
 def _subject(entry: StoredEntry) -> tuple[str, str, bool]:
     event = entry.entry.event
     return event.names.pen, event.names.tip, event.is_simulated
+
+
+def repeatability_entries(found: Repeatability) -> dict[str, Any]:
+    """Return the entries of a repeatability study."""
+    control = found.control
+    return {
+        "mean_mm": found.scatter.mean,
+        "std_mm": found.scatter.deviation,
+        "range_mm": found.scatter.range,
+        "control": (
+            None
+            if control is None
+            else {
+                "lower_mm": control.lower,
+                "center_mm": control.center,
+                "upper_mm": control.upper,
+                "out_of_control": [tip.name for tip in found.out_of_control],
+            }
+        ),
+        "tips": [
+            {
+                "name": tip.name,
+                "tip_pen_mm": tip.tip_pen,
+                "expanded_uncertainty_mm": tip.uncertainty,
+                "when": None if tip.when is None else tip.when.isoformat(),
+            }
+            for tip in found.tips
+        ],
+    }
+
+
+# As text, in the table of the paper.
+#
+# [1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system - probe
+# tip center calibration", Measurement Science Review 13 (2013) 194-199, table 1.
+
+
+def repeatability_text(
+    found: Repeatability, rule: Message = BY_SIMPLE_ACCEPTANCE
+) -> str:
+    """Return calibrations of one tip as text: the paper's Table 1."""
+
+    def row(title: str, values: FloatArray, digits: int = 4) -> str:
+        return f"{title:<{TITLE}}" + "".join(f"{x:{COLUMN}.{digits}f}" for x in values)
+
+    lines = [
+        "Center coordinates of the probe tip, mm",
+        f"{'No. of test':<{TITLE}}"
+        + "".join(f"{axis + '-axis':>{COLUMN}}" for axis in "xyz"),
+        *(
+            row(f"{i + 1:>3} {tip.name}"[:TITLE], tip.tip_pen)
+            for i, tip in enumerate(found.tips)
+        ),
+        row("Ave", found.scatter.mean),
+        row("Std", found.scatter.deviation),
+        row("Range", found.scatter.range),
+    ]
+    if found.control is not None:
+        lines += [
+            row("Control limit, lower", found.control.lower),
+            row("Control limit, upper", found.control.upper),
+        ]
+    out = found.out_of_control
+    if out:
+        lines.append("Out of control: " + ", ".join(tip.name for tip in out))
+    return "\n".join([*lines, "", *verdict_lines(found.assessment, rule)])

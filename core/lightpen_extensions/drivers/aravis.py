@@ -233,14 +233,6 @@ class AravisFeatures:
         self._call(aravis.camera_get_float_bounds, key, byref(low), byref(high))
         return Range(low.value, high.value)
 
-    def set_number(self, name: str, value: float) -> None:
-        """Set a number that is within its limits."""
-        aravis, key = self._aravis, name.encode()
-        if self._is_integer(name):
-            self._call(aravis.camera_set_integer, key, round(value))
-        else:
-            self._call(aravis.camera_set_float, key, float(value))
-
     def choice(self, name: str) -> str:
         """Return the current entry of an enumeration."""
         entry: bytes = self._call(self._aravis.camera_get_string, name.encode())
@@ -258,13 +250,17 @@ class AravisFeatures:
         aravis.free(entries)
         return found
 
-    def choose(self, name: str, entry: str) -> None:
-        """Choose an entry of an enumeration."""
-        self._call(self._aravis.camera_set_string, name.encode(), entry.encode())
-
-    def switch_on(self, name: str) -> None:
-        """Set a truth value."""
-        self._call(self._aravis.camera_set_boolean, name.encode(), 1)
+    def set(self, name: str, value: float | str | bool) -> None:
+        """Set a number within its limits, an entry of an enumeration or a switch."""
+        aravis, key = self._aravis, name.encode()
+        if isinstance(value, str):
+            self._call(aravis.camera_set_string, key, value.encode())
+        elif isinstance(value, bool):
+            self._call(aravis.camera_set_boolean, key, value)
+        elif self._is_integer(name):
+            self._call(aravis.camera_set_integer, key, round(value))
+        else:
+            self._call(aravis.camera_set_float, key, float(value))
 
     def execute(self, name: str) -> None:
         """Execute a command."""

@@ -37,20 +37,14 @@ class Features(Protocol):
     def limits(self, name: str) -> Range:
         """Return the present range of a number."""
 
-    def set_number(self, name: str, value: float) -> None:
-        """Set a number that is within its limits."""
-
     def choice(self, name: str) -> str:
         """Return the current entry of an enumeration."""
 
     def choices(self, name: str) -> tuple[str, ...]:
         """Return the entries of an enumeration that can be chosen now."""
 
-    def choose(self, name: str, entry: str) -> None:
-        """Choose an entry of an enumeration."""
-
-    def switch_on(self, name: str) -> None:
-        """Set a truth value."""
+    def set(self, name: str, value: float | str | bool) -> None:
+        """Set a number within its limits, an entry of an enumeration or a switch."""
 
     def execute(self, name: str) -> None:
         """Execute a command."""
@@ -96,7 +90,7 @@ def apply_settings(features: Features, wanted: CameraSettings) -> None:
     """
     for name in AUTOMATICS:
         if _offers(features, name, "Off"):
-            features.choose(name, "Off")
+            features.set(name, "Off")
     _choose_pixel_format(features, wanted.pixel_format)
     if wanted.region is not None:
         _set_region(features, wanted.region)
@@ -105,7 +99,7 @@ def apply_settings(features: Features, wanted: CameraSettings) -> None:
     if wanted.frame_rate is not None:
         for name in FRAME_RATE_SWITCHES:
             if features.has(name):
-                features.switch_on(name)
+                features.set(name, True)
     # The exposure limits the frame rate and the other way round: the rate once more.
     set_nearest(features, FRAME_RATES, wanted.frame_rate)
     set_nearest(features, EXPOSURES, wanted.exposure_us)
@@ -121,7 +115,7 @@ def set_nearest(
     if name is None:
         return None
     if value is not None:
-        features.set_number(name, features.limits(name).nearest(value))
+        features.set(name, features.limits(name).nearest(value))
     return features.number(name)
 
 
@@ -154,13 +148,13 @@ def _set_region(features: Features, wanted: Region) -> None:
     region = limits.nearest(wanted)
     has_offsets = features.has("OffsetX") and features.has("OffsetY")
     if has_offsets:
-        features.set_number("OffsetX", 0)
-        features.set_number("OffsetY", 0)
-    features.set_number("Width", region.width)
-    features.set_number("Height", region.height)
+        features.set("OffsetX", 0)
+        features.set("OffsetY", 0)
+    features.set("Width", region.width)
+    features.set("Height", region.height)
     if has_offsets:
-        features.set_number("OffsetX", region.x)
-        features.set_number("OffsetY", region.y)
+        features.set("OffsetX", region.x)
+        features.set("OffsetY", region.y)
 
 
 def _choose_pixel_format(features: Features, wanted: str | None) -> None:
@@ -179,7 +173,7 @@ def _choose_pixel_format(features: Features, wanted: str | None) -> None:
             wanted=wanted,
             offered=", ".join(usable_ones or offered),
         )
-    features.choose("PixelFormat", wanted)
+    features.set("PixelFormat", wanted)
 
 
 def _choose_trigger(features: Features, wanted: TriggerMode | None) -> None:
@@ -191,10 +185,10 @@ def _choose_trigger(features: Features, wanted: TriggerMode | None) -> None:
     if not _has_trigger(features):
         wanted = TriggerMode.FREE
     if _offers(features, "TriggerSelector", "FrameStart"):
-        features.choose("TriggerSelector", "FrameStart")
+        features.set("TriggerSelector", "FrameStart")
     if wanted is TriggerMode.SOFTWARE:
-        features.choose("TriggerSource", "Software")
-    features.choose("TriggerMode", "On" if wanted is TriggerMode.SOFTWARE else "Off")
+        features.set("TriggerSource", "Software")
+    features.set("TriggerMode", "On" if wanted is TriggerMode.SOFTWARE else "Off")
 
 
 def _has_trigger(features: Features) -> bool:

@@ -11,8 +11,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -30,34 +28,27 @@ from lightpen_extensions.drivers.device_camera import (
 )
 
 WRITE_ONLY, READ_WRITE = 2, 4  # of EAccessMode; a command is write-only
+PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
+SUFFIX = ".cti"
+N_BUFFERS = 16  # images in transit; each buffer is returned once copied
+POLL = 0.002  # s that a call may keep the other threads waiting
+PAUSE = 0.003  # s between two calls
 
 
-@dataclass(frozen=True)
-class GenapiFeatures:
-    """The features of an open camera.
+class GenicamFeatures:
+    """The features of an open camera by its nodes, with errors as messages."""
 
-    Parameters
-    ----------
-    find : callable
-        Returns a node by name, or None.
-    spell : callable
-        Returns the name of an attribute of a node as this library spells it.
-    access : callable
-        Returns the access mode of a node.
-    converting_errors : callable
-        Returns a context that converts errors.
-    """
-
-    find: Callable[[str], Any]
-    spell: Callable[[str], str]
-    access: Callable[[Any], int]
-    converting_errors: Callable[[], AbstractContextManager[None]]
+    def __init__(self, nodes: Any, serial: str) -> None:
+        self._nodes = nodes
+        self._serial = serial
 
     def has(self, name: str) -> bool:
         """Return whether the camera has a feature that is available now."""
-        with self.converting_errors():
-            node = self.find(name)
-            return node is not None and self.access(node) in (WRITE_ONLY, READ_WRITE)
+        with _converting_errors(self._serial):
+            if not self._nodes.has_node(name):
+                return False
+            access = int(self._nodes.get_node(name).get_access_mode())
+            return access in (WRITE_ONLY, READ_WRITE)
 
     def number(self, name: str) -> float:
         """Return the value of a number."""
@@ -70,11 +61,6 @@ class GenapiFeatures:
         step = self._read(name, "inc") if isinstance(low, int) else 0.0
         return Range(float(low), float(high), float(step))
 
-    def set_number(self, name: str, value: float) -> None:
-        """Set a number that is within its limits."""
-        is_integer = isinstance(self._read(name, "value"), int)
-        self._write(name, round(value) if is_integer else float(value))
-
     def choice(self, name: str) -> str:
         """Return the current entry of an enumeration."""
         return str(self._read(name, "value"))
@@ -83,58 +69,25 @@ class GenapiFeatures:
         """Return the entries of an enumeration that can be chosen now."""
         return tuple(map(str, self._read(name, "symbolics")))
 
-    def choose(self, name: str, entry: str) -> None:
-        """Choose an entry of an enumeration."""
-        self._write(name, entry)
-
-    def switch_on(self, name: str) -> None:
-        """Set a truth value."""
-        self._write(name, True)
+    def set(self, name: str, value: float | str | bool) -> None:
+        """Set a number within its limits, an entry of an enumeration or a switch."""
+        if not isinstance(value, (str, bool)):
+            is_integer = isinstance(self._read(name, "value"), int)
+            value = round(value) if is_integer else float(value)
+        with _converting_errors(self._serial):
+            self._nodes.get_node(name).value = value
 
     def execute(self, name: str) -> None:
         """Execute a command."""
-        with self.converting_errors():
-            getattr(self.find(name), self.spell("execute"))()
+        with _converting_errors(self._serial):
+            self._nodes.get_node(name).execute()
 
     def _read(self, name: str, what: str) -> Any:
-        with self.converting_errors():
-            return getattr(self.find(name), self.spell(what))
-
-    def _write(self, name: str, value: float | str | bool) -> None:
-        with self.converting_errors():
-            setattr(self.find(name), self.spell("value"), value)
+        with _converting_errors(self._serial):
+            return getattr(self._nodes.get_node(name), what)
 
 
-def refusals(genapi: Any) -> tuple[type[Exception], ...]:
-    """Return the exceptions of GenApi for refused requests."""
-    return (
-        genapi.AccessException,
-        genapi.InvalidArgumentException,
-        genapi.LogicalErrorException,
-        genapi.OutOfRangeException,
-    )
-
-
-PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
-SUFFIX = ".cti"
-N_BUFFERS = 16  # images in transit; each buffer is returned once copied
-POLL = 0.002  # s that a call may keep the other threads waiting
-PAUSE = 0.003  # s between two calls
-
-
-class GenapiDevice:
-    """What all cameras with GenApi nodes share."""
-
-    _features: GenapiFeatures | None = None
-
-    @property
-    def features(self) -> GenapiFeatures:
-        """The features of the open camera."""
-        assert self._features is not None
-        return self._features
-
-
-class GenicamDevice(GenapiDevice):
+class GenicamDevice:
     """A camera that a GenTL producer drives."""
 
     def __init__(self, place: SourcePlace) -> None:
@@ -142,6 +95,13 @@ class GenicamDevice(GenapiDevice):
         self._producer = place.producer
         self._harvester: Any = None
         self._acquirer: Any = None
+        self._features: GenicamFeatures | None = None
+
+    @property
+    def features(self) -> GenicamFeatures:
+        """The features of the open camera."""
+        assert self._features is not None
+        return self._features
 
     def open(self) -> None:
         """Open the camera."""
@@ -174,13 +134,7 @@ class GenicamDevice(GenapiDevice):
             self.close()
             raise
         acquirer.num_buffers = max(N_BUFFERS, acquirer.min_num_buffers)
-        nodes = acquirer.remote_device.node_map
-        self._features = GenapiFeatures(
-            lambda key: nodes.get_node(key) if nodes.has_node(key) else None,
-            lambda attribute: attribute,
-            lambda node: int(node.get_access_mode()),
-            partial(_converting_errors, name),
-        )
+        self._features = GenicamFeatures(acquirer.remote_device.node_map, name)
 
     def close(self) -> None:
         """Close the camera and the producer."""
@@ -241,8 +195,14 @@ def _delivery(module: Any) -> DeliveredFrame:
 def _converting_errors(serial: str) -> AbstractContextManager[None]:
     from genicam import genapi, gentl
 
+    refusals = (
+        genapi.AccessException,
+        genapi.InvalidArgumentException,
+        genapi.LogicalErrorException,
+        genapi.OutOfRangeException,
+    )
     losses = (genapi.GenericException, gentl.GenericException)
-    return in_sentences(serial, refusals(genapi), losses)
+    return in_sentences(serial, refusals, losses)
 
 
 def _quietly(act: Callable[[], object]) -> None:

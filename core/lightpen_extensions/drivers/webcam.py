@@ -48,16 +48,10 @@ class WebcamFeatures:
         """Return the pixel format."""
         return (self._format,)
 
-    def set_number(self, name: str, value: float) -> None:
-        """Raise `ConfigError`."""
-        raise setting_refused(self._place, name)
-
-    def choose(self, name: str, entry: str) -> None:
-        """Choose the only pixel format."""
-
-    def switch_on(self, name: str) -> None:
-        """Raise `ConfigError`."""
-        raise setting_refused(self._place, name)
+    def set(self, name: str, value: float | str | bool) -> None:
+        """Raise `ConfigError`, unless it is the pixel format."""
+        if name != "PixelFormat":
+            raise setting_refused(self._place, name)
 
     def execute(self, name: str) -> None:
         """Raise `ConfigError`."""

@@ -6016,14 +6016,6 @@ needed</source>
         <translation>方案</translation>
     </message>
     <message>
-        <source>pypylon is not installed. It drives Basler cameras: {python} -m pip install pypylon</source>
-        <translation>未安装 pypylon。它驱动 Basler 相机：{python} -m pip install pypylon</translation>
-    </message>
-    <message>
-        <source>pypylon is not part of this program. Basler cameras also work as GenICam cameras, with the GenTL producer of pylon.</source>
-        <translation>本程序不包含 pypylon。Basler 相机也可借助 pylon 的 GenTL 生产者作为 GenICam 相机使用。</translation>
-    </message>
-    <message>
         <source>rig file</source>
         <translation>相机组文件</translation>
     </message>

@@ -37,8 +37,10 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
-from lightpen_extensions.comparisons.assessment import VerificationAssessment
-from lightpen_extensions.comparisons.records import verification_record
+from lightpen_extensions.comparisons.assessment import (
+    VerificationAssessment,
+    verification_record,
+)
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")

@@ -31,6 +31,13 @@ from lightpen.record.calibrations import CalibrationFile, keep_bending, read_cal
 from lightpen.record.library.library_changes import Author
 from lightpen.record.recomputing import recompute, recorded_camera_and_pen
 from lightpen.record.results.result_folder import data_folder_of
+from lightpen_extensions.comparisons.assessment import (
+    BY_SIMPLE_ACCEPTANCE,
+    COLUMN,
+    TITLE,
+    verdict_lines,
+    verification_record,
+)
 from lightpen_extensions.comparisons.commands.entering import (
     add_entering,
     add_exit_by_verdict,
@@ -45,13 +52,6 @@ from lightpen_extensions.comparisons.pen_health import (
     require_one_pen,
 )
 from lightpen_extensions.comparisons.press_test import PRESS_TEST, PressTest, press_test
-from lightpen_extensions.comparisons.records import (
-    BY_SIMPLE_ACCEPTANCE,
-    COLUMN,
-    TITLE,
-    verdict_lines,
-    verification_record,
-)
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:

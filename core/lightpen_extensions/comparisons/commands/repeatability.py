@@ -20,6 +20,7 @@ from lightpen.formats.own_json import file_entry
 from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen_extensions.comparisons.assessment import verification_record
 from lightpen_extensions.comparisons.commands.entering import (
     add_entering,
     add_verdict,
@@ -27,12 +28,11 @@ from lightpen_extensions.comparisons.commands.entering import (
     limits_in_force,
 )
 from lightpen_extensions.comparisons.pen_health import require_one_pen
-from lightpen_extensions.comparisons.records import (
+from lightpen_extensions.comparisons.repeatability import (
+    measure_repeatability,
     repeatability_entries,
     repeatability_text,
-    verification_record,
 )
-from lightpen_extensions.comparisons.repeatability import measure_repeatability
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:

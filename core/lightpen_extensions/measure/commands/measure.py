@@ -25,9 +25,11 @@ from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
 from lightpen_extensions.comparisons.assessment import (
+    COLUMN,
     VERIFY_AGAIN,
     VerificationAssessment,
     check,
+    verdict_lines,
 )
 from lightpen_extensions.comparisons.commands.entering import (
     add_ball,
@@ -40,7 +42,6 @@ from lightpen_extensions.comparisons.commands.pens import (
     add_verify_pen,
     add_verify_press,
 )
-from lightpen_extensions.comparisons.records import COLUMN, verdict_lines
 from lightpen_extensions.measure.commands.touched import (
     MeasuredRuns,
     add_runs,

@@ -26,9 +26,9 @@ from lightpen.record.folder import conditions_entries
 from lightpen_extensions.comparisons.assessment import (
     VerificationAssessment,
     read_drift,
+    verification_record,
 )
 from lightpen_extensions.comparisons.commands.entering import limits_in_force
-from lightpen_extensions.comparisons.records import verification_record
 from lightpen_extensions.measure.probing.probing import (
     FAST,
     ONE_IMAGE,

@@ -39,8 +39,10 @@ from lightpen.record.library.supervision import (
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen_extensions.comparisons.assessment import VerificationAssessment
-from lightpen_extensions.comparisons.records import verification_record
+from lightpen_extensions.comparisons.assessment import (
+    VerificationAssessment,
+    verification_record,
+)
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.sources import PenCameras
 from lightpen_extensions.measure.session import SessionSetup, VerificationStatus

@@ -31,12 +31,12 @@ from lightpen_extensions.comparisons.assessment import (
     MORE_POINTS,
     RELEVANT,
     VERIFY_AGAIN,
+    Scatter,
     VerificationAssessment,
     accepted,
     check,
     refused,
 )
-from lightpen_extensions.comparisons.repeatability import Scatter
 from lightpen_extensions.measure.measuring.report import (
     ResultRow,
     ResultTable,

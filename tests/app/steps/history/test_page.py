@@ -74,8 +74,8 @@ from lightpen_extensions.comparisons.assessment import (
     USE_TIP,
     VERIFY_AGAIN,
     VerificationAssessment,
+    verification_record,
 )
-from lightpen_extensions.comparisons.records import verification_record
 from lightpen_extensions.plant.server import Replicator
 from lightpen_resources import languages
 

@@ -144,10 +144,10 @@ def test_a_station_is_set_up_by_pen_and_tip_and_simulates_nothing(
 
 @pytest.mark.slow
 def test_a_real_station_is_at_its_first_live_image_after_four_entries(
-    open_wizard: "OpenWizard", basler: SourcePlace
+    open_wizard: "OpenWizard", aravis: SourcePlace
 ) -> None:
-    found = FoundDevice(basler.name, f"Basler emulation ({basler.name})")
-    source = source_named("basler")
+    found = FoundDevice(aravis.name, f"Aravis simulator ({aravis.name})")
+    source = source_named("aravis")
     assert source is not None
     cameras = ((source, found),)
     walker = open_wizard(
@@ -167,5 +167,5 @@ def test_a_real_station_is_at_its_first_live_image_after_four_entries(
 
     assert time.monotonic() - begun < 30
     chosen = walker.workbench.selection.preparation.source
-    assert chosen == SourceChoice("basler", basler.name)
+    assert chosen == SourceChoice("aravis", aravis.name)
     assert not walker.tells("SIMULATED")

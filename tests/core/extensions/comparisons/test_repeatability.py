@@ -10,11 +10,11 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.comparisons.records import (
+from lightpen_extensions.comparisons.repeatability import (
+    measure_repeatability,
     repeatability_entries,
     repeatability_text,
 )
-from lightpen_extensions.comparisons.repeatability import measure_repeatability
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
 LIMITS = VerificationLimits()

@@ -98,8 +98,8 @@ def test_packets_of_others_are_not_taken_for_images_of_the_camera(
     with packets_of_others(others_number):
         for _ in range(4):  # as not each start meets some
             seen.open()
-            seen.features.set_number("Width", 160)
-            seen.features.set_number("Height", 120)
+            seen.features.set("Width", 160)
+            seen.features.set("Height", 120)
             seen.start()
             first.append(seen.fetch(TIMEOUT))
             seen.stop()

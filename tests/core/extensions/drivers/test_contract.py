@@ -104,7 +104,6 @@ SOURCES = (
     Source("replayed video", replayed_video),
     Source("Aravis", of_stack("aravis")),
     Source("Harvesters", of_stack("genicam")),
-    Source("pypylon", of_stack("basler")),
     Source("webcam", webcam),
 )
 

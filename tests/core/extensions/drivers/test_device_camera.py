@@ -6,8 +6,7 @@ from typing_extensions import override
 from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
 from lightpen.cameras.source import SourcePlace
-from lightpen_extensions.drivers.basler import BASLER
-from lightpen_extensions.drivers.genicam import GenapiFeatures
+from lightpen_extensions.drivers.aravis import ARAVIS, AravisFeatures
 
 TRIGGERED = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
 
@@ -25,19 +24,19 @@ class TickingClock(MachineClock):
 
 
 def test_a_trigger_that_never_reached_the_camera_is_given_again(
-    basler: SourcePlace, monkeypatch: pytest.MonkeyPatch
+    aravis: SourcePlace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     commands: list[str] = []
-    execute = GenapiFeatures.execute
+    execute = AravisFeatures.execute
 
-    def lose_the_first(features: GenapiFeatures, name: str) -> None:
+    def lose_the_first(features: AravisFeatures, name: str) -> None:
         commands.append(name)
         if len(commands) > 1:
             execute(features, name)
 
-    monkeypatch.setattr(GenapiFeatures, "execute", lose_the_first)
-    assert BASLER.camera is not None
-    camera = BASLER.camera(basler, TickingClock())
+    monkeypatch.setattr(AravisFeatures, "execute", lose_the_first)
+    assert ARAVIS.camera is not None
+    camera = ARAVIS.camera(aravis, TickingClock())
     camera.open()
     try:
         camera.configure(TRIGGERED)

@@ -8,21 +8,12 @@ from pathlib import Path
 import pytest
 
 from lightpen.cameras.pairing import MachineClock
-from lightpen.cameras.protocol import (
-    CameraSettings,
-    DeviceNotFound,
-    FrameIncomplete,
-    ImageCamera,
-)
+from lightpen.cameras.protocol import DeviceNotFound, ImageCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, absent_sources, source_named
 from lightpen_extensions.drivers import aravis as aravis_library
-from lightpen_extensions.drivers import basler, genicam
-from lightpen_extensions.drivers.basler import BaslerDevice
-from lightpen_extensions.drivers.device_camera import DeviceCamera
+from lightpen_extensions.drivers import genicam
 
-TIMEOUT = 60.0  # s
-MANY = 50  # images, one of which fails
 NOWHERE = SourcePlace("none-of-this-name")
 
 
@@ -33,17 +24,8 @@ def camera(key: str, place: SourcePlace) -> ImageCamera:
     return source.camera(place, MachineClock())
 
 
-def read(camera: ImageCamera, n_images: int) -> None:
-    for _ in range(n_images):
-        camera.read(TIMEOUT)
-
-
 def no_module(name: str) -> ModuleSpec | None:
     return None
-
-
-def pip_alone(name: str) -> ModuleSpec | None:
-    return ModuleSpec(name, None) if name == "pip" else None
 
 
 def no_library(name: str) -> ctypes.CDLL:
@@ -62,7 +44,6 @@ def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(genicam, "find_spec", no_module)
-    monkeypatch.setattr(basler, "find_spec", pip_alone)
     monkeypatch.setattr(ctypes, "CDLL", no_library)
     aravis_library.load_aravis.cache_clear()
     try:
@@ -74,18 +55,9 @@ def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
     finally:
         aravis_library.load_aravis.cache_clear()
 
-    assert set(reported) == {"aravis", "genicam", "basler"}
+    assert set(reported) == {"aravis", "genicam"}
     assert "apt-get install libaravis-0.8-0" in reported["aravis"]
     assert "pip install harvesters genicam" in reported["genicam"]
-    assert "pip install pypylon" in reported["basler"]
-
-
-def test_where_nothing_can_be_installed_another_way_to_the_camera_is_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(basler, "find_spec", no_module)
-
-    assert "also work as GenICam cameras" in str(absent_sources()["basler"])
 
 
 def test_a_serial_number_that_no_camera_has_is_reported(genicam: SourcePlace) -> None:
@@ -132,18 +104,3 @@ def test_producers_are_found_where_the_system_says(
 def test_a_webcam_that_is_not_there_is_reported() -> None:
     with pytest.raises(DeviceNotFound, match="no camera none-of-this-name"):
         camera("webcam", NOWHERE).open()
-
-
-def test_pylons_failed_images_are_left_out_and_counted(basler: SourcePlace) -> None:
-    device = BaslerDevice(basler.name)
-    seen = DeviceCamera(device)
-    seen.open()
-    seen.configure(CameraSettings(frame_rate=50.0))
-    seen.start()
-    seen.read(TIMEOUT)
-    device.features.execute("ForceFailedBuffer")
-    with pytest.raises(FrameIncomplete, match="incomplete"):
-        read(seen, MANY)
-    seen.close()
-
-    assert seen.stats().incomplete == 1

@@ -9,7 +9,11 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen_extensions.comparisons.assessment import VERIFY_AGAIN, check
+from lightpen_extensions.comparisons.assessment import (
+    VERIFY_AGAIN,
+    check,
+    verification_record,
+)
 from lightpen_extensions.comparisons.commands.pens import (
     pen_health_entries,
     pen_health_text,
@@ -17,12 +21,11 @@ from lightpen_extensions.comparisons.commands.pens import (
 )
 from lightpen_extensions.comparisons.pen_health import Growth, PenHealth, SwingOfPen
 from lightpen_extensions.comparisons.press_test import PressTest
-from lightpen_extensions.comparisons.records import (
+from lightpen_extensions.comparisons.repeatability import (
+    Repeatability,
     repeatability_entries,
     repeatability_text,
-    verification_record,
 )
-from lightpen_extensions.comparisons.repeatability import Repeatability
 from lightpen_extensions.measure.commands.measure import found_text, touches_text
 from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, RejectedFrame

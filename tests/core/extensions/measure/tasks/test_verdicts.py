@@ -15,8 +15,11 @@ from lightpen.messages import message
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.comparisons.assessment import VerificationAssessment, accepted
-from lightpen_extensions.comparisons.repeatability import Scatter
+from lightpen_extensions.comparisons.assessment import (
+    Scatter,
+    VerificationAssessment,
+    accepted,
+)
 from lightpen_extensions.measure.tasks import drift, fixed_point
 from lightpen_extensions.measure.tasks.fixed_point import TipEvidence, judged_tip
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
