@@ -254,7 +254,6 @@ MESSAGES = {
     "source.genicam": "GenICam with a vendor's GenTL producer",
     "genicam.no-producer": "No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.",
     "genicam.does-not-load": "The GenTL producer {file} does not load: {why}. Choose the 64-bit producer of this camera for this system.",
-    "source.named": "{name}",
     "source.webcam": "Webcam (evaluation only)",
     "monte-carlo.confirms": "Monte Carlo confirms U: the largest difference is {percent:.0f} % along {axis}, with a standard error of {own:.0f} %.",
     "monte-carlo.less": "Monte Carlo gives less: U is {percent:.0f} % larger along {axis} (standard error {own:.0f} %), on the safe side. It counts seat, drift and assumed values in full; each trial corrects what its images show of them.",
