@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from enum import Enum, auto
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic
@@ -94,7 +93,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
         Command that signs the file whose path is put after it; none leaves them
         unsigned.
     fast : bool
-        Pack quickly, not small.
+        Do not compress.
 
     Raises
     ------
@@ -139,7 +138,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     set_times(folder, moment)
     _say("Packing")
     setup = out / f"Lightpen-{version}-setup.exe"
-    pack(folder, work, setup, version, Packing.QUICK if fast else Packing.SMALL, sign)
+    pack(folder, work, setup, version, fast, sign)
     return setup
 
 
@@ -198,21 +197,8 @@ def sign_file(sign: str, path: Path) -> None:
         raise BuildError(f"{path} bears no signature after: {sign}")
 
 
-class Packing(Enum):
-    """How the files are packed: as small as can be, quickly, or as they are."""
-
-    SMALL = auto()
-    QUICK = auto()
-    STORED = auto()
-
-
 def pack(
-    folder: Path,
-    work: Path,
-    setup: Path,
-    version: str,
-    packing: Packing,
-    sign: str = "",
+    folder: Path, work: Path, setup: Path, version: str, stored: bool, sign: str = ""
 ) -> None:
     """Pack the folder into the installer.
 
@@ -222,6 +208,8 @@ def pack(
         Folder for what is only needed meanwhile.
     setup : Path
         File to write.
+    stored : bool
+        The files are not compressed, which is quicker.
     """
     ico = work / "lightpen.ico"
     ico.write_bytes(icon())
@@ -238,8 +226,7 @@ def pack(
         **({"SIGN": sign} if sign else {}),
         # Debian's NSIS makes installers of 64 bits, which run where Wine has no 32.
         **({} if IS_WINDOWS else {"TARGET": "amd64-unicode"}),
-        **({} if packing is Packing.SMALL else {"QUICK": ""}),
-        **({"STORED": ""} if packing is Packing.STORED else {}),
+        **({"STORED": ""} if stored else {}),
     }
     options = [f"-D{name}={value}" for name, value in defined.items()]
     script = INSTALLER / "windows" / "lightpen.nsi"
@@ -329,7 +316,7 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=ROOT / "dist" / "windows", metavar="FOLDER"
     )
     parser.add_argument(
-        "--fast", action="store_true", help="pack quickly, not small, for tests"
+        "--fast", action="store_true", help="do not compress, for tests"
     )
     parser.add_argument(
         "--version",

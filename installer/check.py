@@ -24,7 +24,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from installer import bad_conditions, life, users
-from installer.build import Packing, pack
+from installer.build import pack
 from installer.launchers import ToolMissingError
 from installer.machine import fresh_machine
 from installer.places import IS_WINDOWS
@@ -120,7 +120,7 @@ def try_all(trial: Trial, payload: Path, authority: Path | None) -> None:
     bad_conditions.try_interruption(trial)
     with TemporaryDirectory() as work:
         newer = Path(work) / "newer-setup.exe"
-        pack(payload, Path(work), newer, NEWER, Packing.STORED)
+        pack(payload, Path(work), newer, NEWER, stored=True)
         life.try_upgrade(trial, newer, __version__, NEWER)
     life.try_removal(trial, files, registry)
     users.try_all_users(trial, __version__)

@@ -1,6 +1,6 @@
 ; The installer of Lightpen for one user or for all. Built by installer/build.py, which
 ; defines VERSION, ORDER, NUMBERS, PAYLOAD, OUTFILE, ICON, SIZE_KB and SLASH, for a quick
-; build QUICK, for the quickest STORED as well.
+; build STORED as well.
 ;
 ; Options: /S silent, /ALLUSERS for all users (the account SYSTEM always does so),
 ; /D=FOLDER (last, without quotes), /DOWNGRADE over a newer version, /DESKTOP an icon on
@@ -40,11 +40,8 @@ Unicode true
 Name "${NAME} ${VERSION}"
 OutFile "${OUTFILE}"
 RequestExecutionLevel user
-!ifdef QUICK
-  SetCompressor zlib
-  !ifdef STORED
-    SetCompress off
-  !endif
+!ifdef STORED
+  SetCompress off
 !else
   SetCompressor /SOLID /FINAL lzma
   SetCompressorDictSize 256 ; both libraries of OpenBLAS hold much of the same
