@@ -1,8 +1,10 @@
 """Live images and files go by one rule: what is refused, and why, is the same."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import cv2
 import numpy as np
@@ -218,7 +220,15 @@ def assert_alike(live: PenDetection, files: Observations, index: int) -> None:
     assert live.has_pose == np.isfinite(files.rotations[index]).all()
 
 
-@pytest.mark.parametrize("name", SCENES)
+def usual_and_slow() -> Iterator[Any]:
+    """Return the names of the scenes; those of a reason beyond three are slow."""
+    seen: Counter[Reason] = Counter()
+    for name, (_, reason) in SCENES.items():
+        seen[reason] += 1
+        yield pytest.param(name, marks=[pytest.mark.slow] if seen[reason] > 3 else [])
+
+
+@pytest.mark.parametrize("name", [*usual_and_slow()])
 def test_an_image_shows_the_same_live_and_on_files(
     name: str, others: list[Image], before: PenDetection
 ) -> None:

@@ -326,6 +326,7 @@ def test_the_ball_centre_of_a_point_can_be_asked_for() -> None:
     assert part.results[1].value.value == pytest.approx(BALL, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_u_of_point_and_line_covers_their_errors() -> None:
     rng, held = np.random.default_rng(3), []
     plan, exact = parse_plan(THIN, "thin.yaml"), touched_askew()
