@@ -28,7 +28,7 @@ from lightpen.formats.files import write_whole
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.header import FileCopy
+from lightpen.record.swings.header import FileCopy, RecordedCamera
 from lightpen.record.swings.reading import RecordedImage, open_record
 from lightpen.record.swings.solving import source
 from lightpen.record.swings.writing import (
@@ -53,7 +53,7 @@ def swing(data: Path) -> None:
     files = source(model)
     header = structs.replace(
         model.header,
-        camera_file=FileCopy.of(files.camera_files[0], CAMERA_FILE),
+        cameras=(RecordedCamera(FileCopy.of(files.camera_files[0], CAMERA_FILE)),),
         pen_file=FileCopy.of(files.pen_file, PEN_FILE),
     )
     for _ in count():

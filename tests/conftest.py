@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from functools import cache
 from hashlib import sha256
@@ -302,17 +302,17 @@ def script() -> Callable[..., CompletedProcess[str]]:
 
 @pytest.fixture(scope="session")
 def rewrite_header() -> Callable[..., None]:
-    """Return a function that gives a record's header other entries or settings."""
+    """Return a function that gives a record's header other entries, also in part."""
     from lightpen.formats.own_json import with_checksum
 
-    def rewrite(
-        folder: Path, settings: Mapping[str, object] | None = None, **entries: object
-    ) -> None:
+    def rewrite(folder: Path, **entries: object) -> None:
         path = folder / "header.json"
         header = json.loads(path.read_bytes())
         del header["checksum"]
-        header["settings"].update(settings or {})
-        path.write_bytes(with_checksum(json.dumps(header | entries).encode()))
+        for name, entry in entries.items():
+            is_part = isinstance(entry, dict)
+            header[name] = header[name] | entry if is_part else entry
+        path.write_bytes(with_checksum(json.dumps(header).encode()))
 
     return rewrite
 

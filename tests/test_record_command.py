@@ -199,7 +199,6 @@ def test_a_folder_that_is_no_record_still_needs_its_files(
         ("live camera", "live camera", "Origin       LIVE CAMERA"),
         ("recorded", "recorded", "Origin       RECORDED"),
         ("simulated", "simulated", "SIMULATED: this is the tip of no real pen"),
-        ("of a later version", None, None),
     ],
 )
 def test_what_the_images_are_of_is_reported(
@@ -210,7 +209,7 @@ def test_what_the_images_are_of_is_reported(
     origin: str | None,
     line: str | None,
 ) -> None:
-    rewrite_header(folder, {"origin": said})
+    rewrite_header(folder, origin=said)
     fields, text = calibrated(folder)
 
     assert fields["origin"] == origin

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from PySide6.QtCore import Qt
 
+from lightpen.model.names import Origin
 from lightpen.record.results.result_folder import RECORDS
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def done(
     """The step Swing with a swing that passes."""
     record = tmp_path / "data" / RECORDS / "swing"
     shutil.copytree(swung(), record)
-    limits = {"max_uncertainty_mm": 1.0, "min_images": 10, "min_per_field": 0}
-    rewrite_header(record, {**limits, "origin": "live"})
+    limits = {"max_uncertainty": 1.0, "min_images": 10, "min_per_field": 0}
+    rewrite_header(record, limits=limits, origin=Origin.LIVE)
     walker = open_wizard()
     walker.workbench.run.open_requested.emit(record)
     walker.until_shows("Swing")  # which ends by itself: it has images enough

@@ -108,6 +108,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     assert (error < 0.03).all()  # U is 0.02 mm at most
     assert result.origin is Origin.LIVE
     record = open_record(Path(result.record))
-    assert record.header.settings["camera_serial"] == "LP01"
-    assert record.header.settings["pixel_format"] == "Mono8"
+    used = record.header.cameras[0].in_use
+    assert used is not None
+    assert (used.serial, used.settings.pixel_format) == ("LP01", "Mono8")
     assert record.stats.delivered >= len(record.images)

@@ -11,13 +11,13 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.protocol import CameraInUse, CameraSettings
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds
 from lightpen.cameras.sources import source_named
 from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.live.sources import SourceEnvironment, cameras_of
-from lightpen.swing.preparation import CameraInUse, Preparation, SourceKind
+from lightpen.swing.preparation import Preparation, SourceKind
 from lightpen_app.look.words import shortened
 from lightpen_app.work.job import LatestJob, Notifications, Report
 from lightpen_app.work.live_view import DisplayedImage, LiveView

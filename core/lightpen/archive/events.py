@@ -43,14 +43,7 @@ from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.record.results.result_folder import RESULT, SIMULATED, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import HEADER, Names, header_copies
-from lightpen.record.swings.reading import (
-    JOURNAL,
-    Record,
-    journal_bytes,
-    open_record,
-    recorded_names,
-    recorded_origin,
-)
+from lightpen.record.swings.reading import JOURNAL, Record, journal_bytes, open_record
 from lightpen.record.swings.solving import Solution, record_inputs
 
 
@@ -196,9 +189,9 @@ def _event_of_swing(
     return Event(
         kind=kind,
         at=at,
-        names=recorded_names(record),
+        names=record.header.names,
         program=record.header.program,
-        origin=recorded_origin(record),
+        origin=record.header.origin,
         swing=results.place_of(record.folder),
         settings=record.header.settings,
         files=_files_of(results, record),

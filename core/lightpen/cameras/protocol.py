@@ -221,6 +221,14 @@ class CameraSettings:
     packet_size: int | None = None  # of a network camera, bytes
 
 
+@dataclass(frozen=True)
+class CameraInUse:
+    """The camera that images come from."""
+
+    serial: str
+    settings: CameraSettings
+
+
 class ImageCamera(Protocol):
     """An image source, found by its serial number when it is opened.
 

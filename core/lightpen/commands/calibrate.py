@@ -52,7 +52,6 @@ from lightpen.record.swings.reading import (
     is_record,
     open_record,
     record_files,
-    recorded_limits,
     unacknowledged_images,
 )
 from lightpen.record.swings.solving import record_inputs, solve_again, solve_record
@@ -155,7 +154,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     return _Calibrated(
         solution.calibration,
         solution.source.pen.nominal_tip,
-        recorded_limits(record),
+        record.header.limits,
         solution.source.origin,
         lambda: record_inputs(solution.source),
     )

@@ -360,8 +360,7 @@ def _header(data: Path, file: CalibrationFile) -> Header | None:
 
 def _serials(header: Header) -> tuple[str, ...]:
     """Return the serial numbers of the cameras of a swing, the first one first."""
-    names, settings = ("camera_serial", "second_camera_serial"), header.settings
-    return tuple(str(settings[name]) for name in names if name in settings)
+    return tuple(each.in_use.serial for each in header.cameras if each.in_use)
 
 
 def status_of(file: CalibrationFile) -> tuple[str, ...]:

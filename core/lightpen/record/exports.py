@@ -19,7 +19,7 @@ from lightpen.messages import Message, message
 from lightpen.model.names import Laboratory, Origin
 from lightpen.record.calibrations import CalibrationFile, parse_calibration, status_of
 from lightpen.record.swings.header import LONGEST_WORD, UNFIT, Names, not_reserved
-from lightpen.record.swings.reading import open_record, recorded_limits
+from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, record_inputs
 
 # Files of an exported calibration: content and names.
@@ -51,7 +51,7 @@ def save_new(folder: Path, name: str, data: bytes) -> Path:
 
 def exported_solution(solution: Solution, names: Names) -> CalibrationFile:
     """Return a solved, not yet accepted swing for export."""
-    limits = recorded_limits(open_record(solution.source.folder))
+    limits = open_record(solution.source.folder).header.limits
     inputs = record_inputs(solution.source)
     record = calibration_record(solution.calibration, inputs, limits)
     data = record_bytes(record)

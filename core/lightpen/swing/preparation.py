@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.protocol import CameraInUse
 from lightpen.cameras.replay import RECORDED
 from lightpen.cameras.source import Source, SourceNeeds
 from lightpen.cameras.sources import SIMULATED, UNCHOSEN, source_named
@@ -56,14 +56,6 @@ class SourceChoice:
 
 
 NO_SOURCE = SourceChoice("")
-
-
-@dataclass(frozen=True)
-class CameraInUse:
-    """The camera that images come from."""
-
-    serial: str
-    settings: CameraSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,6 +242,12 @@ class Preparation:
         if camera == 0 or self.second is None:
             return self.mask
         return self.second.mask
+
+    def in_use(self, camera: int) -> CameraInUse | None:
+        """Return the open camera by its place, from 0."""
+        if camera == 0 or self.second is None:
+            return self.camera_in_use
+        return self.second.in_use
 
     def with_mask(self, camera: int, mask: FloatArray) -> Self:
         """Return a copy with another stray light mask of a camera, counted from 0."""

@@ -17,7 +17,7 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.own_json import Plain, plain
+from lightpen.formats.own_json import plain
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE, RigFile, read_rig
 from lightpen.local_time import local_now
@@ -25,22 +25,8 @@ from lightpen.messages import Code, message
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig
-from lightpen.record.swings.header import (
-    FileCopy,
-    Header,
-    RigCopies,
-    assumption_entries,
-    damaged_file,
-)
-from lightpen.record.swings.reading import (
-    DISCARDED,
-    JOURNAL,
-    Record,
-    is_of_recording,
-    is_press_test,
-    open_record,
-    recorded_limits,
-)
+from lightpen.record.swings.header import FileCopy, Header, RecordedCamera, damaged_file
+from lightpen.record.swings.reading import DISCARDED, JOURNAL, Record, open_record
 from lightpen.record.swings.solving import is_simulated_recording, source
 from lightpen.record.swings.writing import RecordWriter, SecondaryView
 from lightpen.swing.capture.guidance import limits_for_more
@@ -55,12 +41,7 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
 )
-from lightpen.swing.preparation import (
-    CameraInUse,
-    Preparation,
-    SecondCamera,
-    SourceChoice,
-)
+from lightpen.swing.preparation import Preparation, SourceChoice
 
 Rule: TypeAlias = Callable[[SwingSetup, SwingState, PenDetection, float], Transition]
 
@@ -267,97 +248,45 @@ def _others(frame: Frame, detection: PenDetection) -> tuple[SecondaryView, ...]:
     )
 
 
-def record_header(
-    preparation: Preparation, settings: dict[str, Plain] | None = None
-) -> Header:
+def record_header(preparation: Preparation, *, is_press_test: bool = False) -> Header:
     """Return the header of a record that begins now; files are read again."""
-    second = preparation.second
-    rig_file = None if second is None else second.rig_file
+    rig_file = preparation.rig_file
     if rig_file is not None:
-        camera_path = rig_file.camera_files[0]
+        camera_paths = rig_file.camera_files
     elif preparation.camera_file is not None:
-        camera_path = preparation.camera_file.path
+        camera_paths = (preparation.camera_file.path,)
     else:
         raise ValueError("`camera_file` or a rig must be chosen.")
     if preparation.pen_file is None:
         raise ValueError("`pen_file` must be chosen.")
-    limits, origin = preparation.limits, preparation.origin
+    origin = preparation.origin
     if origin is Origin.RECORDED and is_simulated_recording(preparation.source.place):
         origin = Origin.SIMULATED
     return Header(
-        camera_file=FileCopy.of(camera_path, CAMERA_FILE),
-        pen_file=FileCopy.of(preparation.pen_file.path, PEN_FILE),
         created=local_now(),
         program=f"lightpen {__version__}",
-        station=preparation.names.station,
-        operator=preparation.names.operator,
-        tip=preparation.names.tip,
-        cone=preparation.names.cone,
+        names=preparation.names,
+        cameras=tuple(
+            RecordedCamera(
+                FileCopy.of(path, CAMERA_FILE),
+                plain(preparation.mask_of(c)),
+                chosen.kind,
+                chosen.place,
+                preparation.in_use(c),
+            )
+            for c, (path, chosen) in enumerate(
+                zip(camera_paths, preparation.sources, strict=True)
+            )
+        ),
+        rig_file=None if rig_file is None else FileCopy.of(rig_file.path, RIG_FILE),
+        pen_file=FileCopy.of(preparation.pen_file.path, PEN_FILE),
         units=preparation.pen_file.units,
         nominal_tip_mm=plain(preparation.nominal_tip),
-        mask_px=plain(preparation.mask),
-        settings={
-            "pen": preparation.names.pen,
-            "ball_diameter_mm": preparation.names.ball_diameter,
-            "origin": str(origin),
-            "source": str(preparation.source.kind),
-            "source_place": preparation.source.place,
-            **_camera_entries(preparation.camera_in_use),
-            **_second_entries(second),
-            "max_uncertainty_mm": limits.max_uncertainty,
-            "min_images": limits.min_images,
-            "max_images": limits.max_images,
-            "min_per_field": limits.min_per_field,
-            "spacing_rad": limits.spacing,
-            "requires_temperature": limits.requires_temperature,
-            "method": preparation.method,
-            **assumption_entries(preparation.assumptions_today),
-            **(settings or {}),
-        },
-        rig=None if second is None else _rig_copies(second),
-    )
-
-
-def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
-    """Return the entries of a record on the camera."""
-    if used is None:
-        return {}
-    settings, region = used.settings, used.settings.region
-    entries: dict[str, Plain] = {
-        "camera_serial": used.serial,
-        "exposure_us": settings.exposure_us,
-        "gain_db": settings.gain_db,
-        "frame_rate": settings.frame_rate,
-        "pixel_format": settings.pixel_format,
-        "trigger": None if settings.trigger is None else str(settings.trigger),
-        "packet_size": settings.packet_size,
-        "region_px": None
-        if region is None
-        else f"{region.width} x {region.height} at {region.x}, {region.y}",
-    }
-    return {name: entry for name, entry in entries.items() if entry is not None}
-
-
-def _second_entries(second: SecondCamera | None) -> dict[str, Plain]:
-    """Return the entries of a record on the second camera."""
-    if second is None:
-        return {}
-    entries: dict[str, Plain] = {
-        "source": str(second.source.kind),
-        "source_place": second.source.place,
-        **_camera_entries(second.in_use),
-    }
-    return {f"second_{name}": entry for name, entry in entries.items()}
-
-
-def _rig_copies(second: SecondCamera) -> RigCopies | None:
-    file = second.rig_file
-    if file is None:
-        return None
-    return RigCopies(
-        FileCopy.of(file.path, RIG_FILE),
-        tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
-        (plain(second.mask),),
+        origin=origin,
+        limits=preparation.limits,
+        assumptions=preparation.assumptions_today,
+        method=preparation.method,
+        is_press_test=is_press_test,
     )
 
 
@@ -376,23 +305,17 @@ class Resumable:
     @property
     def source_choices(self) -> tuple[SourceChoice, ...]:
         """The source of each camera; none where this version does not know one."""
-        settings, choices = self.record.header.settings, []
-        for which in ("", "second_")[: self.setup.rig.n_cameras]:
-            kind = settings.get(f"{which}source")
-            place = settings.get(f"{which}source_place")
-            if not isinstance(kind, str) or source_named(kind) is None:
-                return ()
-            choices.append(SourceChoice(kind, place if isinstance(place, str) else ""))
-        return tuple(choices)
+        cameras = self.record.header.cameras
+        choices = tuple(SourceChoice(each.source, each.place) for each in cameras)
+        return choices if all(source_named(each.kind) for each in choices) else ()
 
     def is_of(self, sources: Sequence[SourceChoice]) -> bool:
         """Return whether images of these sources can continue it."""
         if len(sources) != self.setup.rig.n_cameras:
             return False
-        source, settings = sources[0], self.record.header.settings
-        kind, place = settings.get("source"), settings.get("source_place")
-        return source.kind == kind and (
-            not self.setup.is_recording or source.place == place
+        source, own = sources[0], self.record.header.cameras[0]
+        return source.kind == own.source and (
+            not self.setup.is_recording or source.place == own.place
         )
 
     def fits(self, image_size: tuple[int, int]) -> bool:
@@ -469,11 +392,11 @@ def recorded_setup(record: Record) -> SwingSetup:
     return SwingSetup(
         found.camera,
         found.pen,
-        recorded_limits(record),
+        record.header.limits,
         found.masks[0],
         assumptions=found.assumptions,
-        is_recording=is_of_recording(record),
+        is_recording=record.header.is_of_recording,
         beside=found.rig,
         other_masks=found.masks[1:],
-        is_press_test=is_press_test(record),
+        is_press_test=record.header.is_press_test,
     )

@@ -13,16 +13,10 @@ from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
-from lightpen.formats.own_json import Plain
 from lightpen.messages import Message, message
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.interrupted import discard_swing
-from lightpen.record.swings.reading import (
-    PRESS_TEST,
-    Record,
-    recorded_names,
-    recorded_origin,
-)
+from lightpen.record.swings.reading import Record
 from lightpen.record.swings.solving import Solution
 from lightpen.record.swings.writing import RecordWriter, make_record_folder
 from lightpen.runners import StartThread, Task
@@ -159,13 +153,13 @@ class SwingWorkflow:
 
     # Capture
 
-    def begin(
-        self, preparation: Preparation, settings: dict[str, Plain] | None = None
-    ) -> None:
+    def begin(self, preparation: Preparation, *, is_press_test: bool = False) -> None:
         """Begin a new swing, or report why it cannot begin."""
         try:
             folder = make_record_folder(self._records, preparation.names, self._now())
-            RecordWriter.create(folder, record_header(preparation, settings)).close()
+            RecordWriter.create(
+                folder, record_header(preparation, is_press_test=is_press_test)
+            ).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
             self._shown.presence = replace(self._shown.presence, refusal=error.message)
@@ -177,7 +171,7 @@ class SwingWorkflow:
         status, record = self._shown.status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
             return  # it continues already
-        names = recorded_names(record)
+        names = record.header.names
         recorder = SwingRecorder(record)
         self.solving.drop()
         self._close_record()
@@ -192,7 +186,7 @@ class SwingWorkflow:
                 state=replace(swing.state, heading=self._heading_for(swing)),
                 record_folder=record.folder,
                 names=names,
-                origin=recorded_origin(record),
+                origin=record.header.origin,
             )
         )
         self._pause_unattended()
@@ -219,7 +213,7 @@ class SwingWorkflow:
         limits = replace(
             choices.limits, min_images=PRESS_IMAGES, max_uncertainty=PRESS_UNCERTAINTY
         )
-        self.begin(replace(choices, limits=limits), {PRESS_TEST: True})
+        self.begin(replace(choices, limits=limits), is_press_test=True)
         if self._shown.status.record_folder != first.record_folder:
             self._first = replace(first, pressed=None), record
 

@@ -293,14 +293,7 @@ class VerificationWorkflow:
         assert preparation is not None
         assert status.tip is not None
         tip = status.tip
-        header = record_header(
-            preparation,
-            {
-                "verification": self._choices.kind,
-                "tip_file": tip.tip_file.path.name,
-                "tip_sha256": tip.tip_file.sha256,
-            },
-        )
+        header = record_header(preparation)
         touches = self._keeping.root(tip) / TOUCHES
         return make_record_folder(touches, tip.names, header.created), header
 

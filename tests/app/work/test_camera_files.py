@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QThreadPool
 
-from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.protocol import CameraInUse, CameraSettings
 from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.rig_files import read_rig, write_camera, write_rig
 from lightpen.model.rigid import Rig
-from lightpen.swing.preparation import CameraInUse, SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.swings import paper_camera
 

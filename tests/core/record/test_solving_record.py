@@ -3,7 +3,6 @@
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,7 @@ from benchmarks.small_records import entries_of
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, Cancelled, FileError
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.formats.own_json import with_checksum
-from lightpen.model.limits import USUAL, SwingLimits
-from lightpen.record.swings.header import HEADER, assumption_entries
+from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import (
     JOURNAL,
     image_name,
@@ -96,7 +93,9 @@ def test_images_put_back_give_the_tip_of_before(folder: Path) -> None:
 def test_a_record_goes_by_its_mask(
     folder: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(folder, mask_px=[[612.0, 512.0, 90.0]])
+    header = json.loads((folder / "header.json").read_bytes())
+    camera = header["cameras"][0] | {"mask_px": [[612.0, 512.0, 90.0]]}
+    rewrite_header(folder, cameras=[camera])
     solution = solve_record(open_record(folder))
     seen = solution.observations.pixels
     distances = np.linalg.norm(seen - [612.0, 512.0], axis=2)
@@ -199,13 +198,11 @@ def test_the_files_of_a_record_are_all_that_its_folder_holds(folder: Path) -> No
     assert json.loads((folder / "header.json").read_text(encoding="utf-8"))
 
 
-def test_a_record_is_solved_by_what_its_station_assumed(folder: Path) -> None:
+def test_a_record_is_solved_by_what_its_station_assumed(
+    folder: Path, rewrite_header: Callable[..., None]
+) -> None:
     usual = solve_record(open_record(folder)).calibration
-    header = folder / HEADER
-    entries = json.loads(header.read_bytes())
-    del entries["checksum"]
-    entries["settings"] |= assumption_entries(replace(USUAL, form_error=0.01))
-    header.write_bytes(with_checksum(json.dumps(entries).encode()))
+    rewrite_header(folder, assumptions={"form_error": 0.01})
     other = solve_record(open_record(folder)).calibration
 
     assert other.assumptions.form_error == 0.01

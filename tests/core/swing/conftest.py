@@ -17,7 +17,7 @@ def solved(
     station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> "Station":
     """A swing that was solved, whose tip can be accepted."""
-    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
+    rewrite_header(interrupted, limits={"max_uncertainty": 1.0})
     station.go_on(interrupted)
     station.solve()
     return station

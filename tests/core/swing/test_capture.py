@@ -18,7 +18,7 @@ from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.formats.rig_files import write_camera
 from lightpen.messages import message
-from lightpen.record.swings.header import FileCopy, Header
+from lightpen.record.swings.header import FileCopy, Header, RecordedCamera
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.state import (
@@ -89,7 +89,7 @@ class Wizard:
         write_camera(scene.camera, folder / "camera.yaml")
         write_pen(scene.pen, folder / "lp04.json")
         header = Header(
-            camera_file=FileCopy.of(folder / "camera.yaml", CAMERA_FILE),
+            cameras=(RecordedCamera(FileCopy.of(folder / "camera.yaml", CAMERA_FILE)),),
             pen_file=FileCopy.of(folder / "lp04.json", PEN_FILE),
             created=datetime(2026, 1, 2, tzinfo=UTC),
         )

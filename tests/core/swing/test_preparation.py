@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.model.names import Origin
 from lightpen.record.swings.header import Names
-from lightpen.record.swings.reading import Record, open_record, recorded_names
+from lightpen.record.swings.reading import Record, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.preparation import (
     NO_SOURCE,
@@ -176,7 +175,7 @@ def test_a_record_brings_its_names_back(
 
     record = recorded(replace(whole, names=names), tmp_path / "swing")
 
-    assert recorded_names(record) == names
+    assert record.header.names == names
 
 
 def test_a_record_brings_its_setup_back_to_the_last_digit(
@@ -205,17 +204,6 @@ def test_a_record_brings_its_setup_back_to_the_last_digit(
         )
 
 
-def test_a_record_of_an_older_program_gets_the_usual_limits(
-    whole: Preparation, tmp_path: Path
-) -> None:
-    header = structs.replace(record_header(whole), settings={"min_images": "many"})
-    RecordWriter.create(tmp_path / "swing", header).close()
-    record = open_record(tmp_path / "swing")
-
-    assert recorded_setup(record).limits == SwingLimits()
-    assert recorded_names(record) == replace(NAMES, pen="", ball_diameter=None)
-
-
 def test_a_file_that_vanished_since_is_reported_when_a_record_begins(
     whole: Preparation, tmp_path: Path
 ) -> None:
@@ -224,14 +212,6 @@ def test_a_file_that_vanished_since_is_reported_when_a_record_begins(
 
     with pytest.raises(FileError, match=r"LED file .*gone\.csv does not exist"):
         record_header(replace(whole, pen_file=gone))
-
-
-def test_what_a_program_adds_is_kept_beside_the_choices(whole: Preparation) -> None:
-    header = record_header(whole, {"exposure_us": 3000.0})
-
-    assert header.settings["exposure_us"] == 3000.0
-    assert header.settings["pen"] == "LP-04"
-    assert header.created.tzinfo is not None
 
 
 # What images are of, and what belongs to a tip

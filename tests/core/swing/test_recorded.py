@@ -21,7 +21,7 @@ from lightpen.formats.decoding import encode_png, read_image
 from lightpen.formats.images import find_images
 from lightpen.messages import Code
 from lightpen.model.names import Origin
-from lightpen.record.swings.reading import open_record, recorded_origin
+from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import solve_record, source
 from lightpen.swing.capture.state import Phase, Progress, SwingEventKind
 from lightpen.swing.preparation import SourceChoice, SourceKind
@@ -199,7 +199,7 @@ def test_the_images_of_a_simulated_swing_stay_simulated(
     recording.show(3)
 
     assert station.status.origin is Origin.SIMULATED
-    assert recorded_origin(open_record(station.record_folder)) is Origin.SIMULATED
+    assert open_record(station.record_folder).header.origin is Origin.SIMULATED
 
 
 def test_a_reading_goes_on_with_its_own_recording_only(

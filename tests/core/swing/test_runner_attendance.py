@@ -216,8 +216,8 @@ def test_after_the_verdict_other_choices_are_asked_about_until_the_tip_is_accept
 def test_a_swing_that_lacks_nothing_is_computed_when_it_is_gone_on_with(
     present: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    enough = {"min_images": N_IMAGES, "min_per_field": 0, "max_uncertainty_mm": 1.0}
-    rewrite_header(interrupted, enough)
+    enough = {"min_images": N_IMAGES, "min_per_field": 0, "max_uncertainty": 1.0}
+    rewrite_header(interrupted, limits=enough)
     present.go_on(interrupted)
 
     present.wait_for_phase(Phase.VERDICT)

@@ -117,7 +117,7 @@ def test_a_swing_whose_entrance_fails_by_a_bug_leaves_the_one_before_whole(
     shutil.copytree(swung(), other)
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.workflow.recorded_names", fail)
+        broken.setattr("lightpen.swing.workflow.SwingRecorder", fail)
         resumable = read_resumable(other)
         station.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         station.wait_until(lambda: len(station.witness.faults) == 1)

@@ -21,7 +21,7 @@ from lightpen.swing.runner import SwingRunner
 @pytest.fixture
 def acceptable(interrupted: Path, rewrite_header: Callable[..., None]) -> Path:
     """An interrupted swing whose tip can be accepted with a reason."""
-    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
+    rewrite_header(interrupted, limits={"max_uncertainty": 1.0})
     return interrupted
 
 

@@ -45,7 +45,7 @@ def test_both_images_of_a_moment_are_recorded_with_what_they_show(by_two: Path) 
 
     assert found.rig is not None
     assert found.rig.names == ("left", "right")
-    assert record.header.settings["second_source"] == "simulated"
+    assert record.header.cameras[1].source == "simulated"
     for image in record.images:
         (other,) = image.others
         assert image.device_time_ns == other.device_time_ns

@@ -15,13 +15,7 @@ from benchmarks.small_records import entries_of
 
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.messages import Code
-from lightpen.record.swings.reading import (
-    DISCARDED,
-    JOURNAL,
-    Record,
-    open_record,
-    recorded_limits,
-)
+from lightpen.record.swings.reading import DISCARDED, JOURNAL, Record, open_record
 from lightpen.record.swings.solving import Solution, record_inputs, solve_record
 from lightpen.swing.capture.rules import stillness
 from lightpen.swing.capture.state import Phase, SwingEventKind
@@ -47,7 +41,7 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
 ) -> None:
     solution = solved.solution
     inputs = record_inputs(solution.source)
-    limits = recorded_limits(open_record(solved.record_folder))
+    limits = open_record(solved.record_folder).header.limits
     record = calibration_record(solution.calibration, inputs, limits)
     fields = entries_of(record)
     fields.pop("created")
@@ -276,7 +270,7 @@ def test_more_images_can_be_captured_after_the_verdict(
 def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
     station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
+    rewrite_header(interrupted, limits={"max_uncertainty": 1.0})
     chosen = replace(station.preparation, heading=np.pi)
     station.runner.ask(lambda workflow: workflow.choose(chosen))
     station.go_on(interrupted)
@@ -364,7 +358,7 @@ def other(
     """The record of another swing, that of the one in force as it was taken."""
     folder = in_force.records / "other"
     shutil.copytree(swung(), folder)
-    rewrite_header(folder, {"max_uncertainty_mm": 1.0})
+    rewrite_header(folder, limits={"max_uncertainty": 1.0})
     return folder
 
 
@@ -454,7 +448,7 @@ def test_a_result_bears_the_time_that_the_runner_goes_by(
     runner = SwingRunner(
         station.records, station.archive, station.witness, now=lambda: noon
     )
-    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
+    rewrite_header(interrupted, limits={"max_uncertainty": 1.0})
     resumable = read_resumable(interrupted)
     runner.ask(lambda workflow: workflow.continue_swing(resumable))
     runner.ask(lambda workflow: workflow.finish())

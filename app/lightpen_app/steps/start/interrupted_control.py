@@ -18,7 +18,7 @@ from lightpen.record.swings.interrupted import (
     discard_swing,
     find_unfinished,
 )
-from lightpen.record.swings.reading import Record, recorded_names, recorded_origin
+from lightpen.record.swings.reading import Record
 from lightpen.swing.swing_recorder import Resumable, read_resumable
 from lightpen_app.face import InterruptedWork, RowWords, Service
 from lightpen_app.look.languages import listed, worded
@@ -124,7 +124,7 @@ class InterruptedControl(QObject):
         return InterruptedEntry(work.words, resume, close)
 
     def _swing_entry(self, record: Record) -> InterruptedEntry:
-        names, folder = recorded_names(record), record.folder
+        names, folder = record.header.names, record.folder
 
         def words() -> RowWords:
             called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
@@ -264,8 +264,8 @@ class InterruptedControl(QObject):
         """Select the item of the swing, its station and, if others are, its sources."""
         selection, header = self._selection, swing.record.header
         station = selection.preparation.names.station
-        self._go_to_station(header.station)
-        names = recorded_names(swing.record)
+        self._go_to_station(header.names.station)
+        names = swing.record.header.names
         names = replace(names, station=names.station or station)
         now = replace(
             selection.preparation, names=names, nominal_tip=header.nominal_tip
@@ -360,6 +360,6 @@ def _source_text(swing: Resumable) -> str:
     """Return the sources of a swing's images and their locations."""
     choices = swing.source_choices
     if not choices:
-        return origin_text(recorded_origin(swing.record))
+        return origin_text(swing.record.header.origin)
     pairs = [(worded(each.source.name), printable(each.place)) for each in choices]
     return listed(text for each in pairs for text in each if text)

@@ -51,15 +51,7 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import InterruptedSwings
-from lightpen.record.swings.reading import (
-    Record,
-    is_of_recording,
-    is_press_test,
-    open_record,
-    recorded_limits,
-    recorded_names,
-    recorded_origin,
-)
+from lightpen.record.swings.reading import Record, open_record
 from lightpen.record.swings.solving import Solution, record_inputs
 from lightpen.record.swings.writing import RecordWriter
 
@@ -81,8 +73,8 @@ def assess(
     archive: FolderArchive, record: Record, solution: Solution
 ) -> SwingAssessment:
     """Judge a solved swing by itself and beside the current result."""
-    names, origin = recorded_names(record), recorded_origin(record)
-    limits, limit, last, unknown = recorded_limits(record), None, None, None
+    names, origin = record.header.names, record.header.origin
+    limits, limit, last, unknown = record.header.limits, None, None, None
     library = Library()
     try:
         limits = _limits_in_force(archive, names, limits)
@@ -112,7 +104,7 @@ def assess(
         [] if doubt is None else [doubt],
         overdue_items(library, names, local_time(record.header.created).date()),
         _far_from_nominal(solution),
-        _bare_sides(solution, limits) if is_of_recording(record) else [],
+        _bare_sides(solution, limits) if record.header.is_of_recording else [],
         warnings_of(solution.calibration),
     )
     doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
@@ -207,16 +199,16 @@ def accept(
     was solved, or the result cannot be stored; the previous one stays current.
     """
     record = open_record(solution.source.folder)
-    if is_press_test(record):
+    if record.header.is_press_test:
         raise AcceptanceError("press-test.not-accepted")
     with RecordWriter.resume(record) as writer:
         _require_same_images(record, solution)
         result = _stored_result(archive, record)
         if result is None:
             assessment = assess(archive, record, solution)
-            require_in_use(archive, recorded_names(record).tip)
+            require_in_use(archive, record.header.names.tip)
             _require_acceptable(assessment.verdict, reason)
-            supervision, station = archive.supervision(), recorded_names(record).station
+            supervision, station = archive.supervision(), record.header.names.station
             key = _approval(supervision, station, assessment, signature, reason)
             result = _result(record, solution, assessment, now, reason.strip())
             if key is not None and signature is not None:
@@ -308,7 +300,7 @@ def _result(
         calibration=calibration_record(
             solution.calibration, record_inputs(solution.source), assessment.limits
         ),
-        origin=recorded_origin(record),
+        origin=record.header.origin,
         reason=reason,
         why=StoredMessage.of(assessment.verdict.reason),
         doubts=tuple(map(StoredMessage.of, assessment.doubts)),

@@ -11,13 +11,13 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
-from msgspec import Struct, to_builtins
-from msgspec.structs import replace
+from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraInUse
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import MEGABYTE, is_reserved, read_bytes
@@ -38,34 +38,8 @@ from lightpen.formats.own_json import (
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE
 from lightpen.messages import Message, message
-from lightpen.model.limits import USUAL, Assumptions, SwingLimits
-from lightpen.model.names import Method
-
-PREFIX = "assumed_"
-
-
-def assumption_entries(assumptions: Assumptions) -> dict[str, Plain]:
-    """Return assumptions as settings of a record."""
-    return {PREFIX + name: value for name, value in asdict(assumptions).items()}
-
-
-def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
-    """Return the assumptions among settings; defaults for missing ones.
-
-    Raises `ValueError` if one makes no sense.
-    """
-    values = asdict(USUAL)
-    for name in values:
-        value = settings.get(PREFIX + name)
-        if isinstance(value, int | float):
-            values[name] = float(value)
-    return Assumptions(**values)
-
-
-def recorded_method(settings: Mapping[str, Plain]) -> Method:
-    """Return the method of the reported tip among settings."""
-    return "two-stage" if settings.get("method") == "two-stage" else "joint"
-
+from lightpen.model.limits import LIMITS, USUAL, Assumptions, StationLimits, SwingLimits
+from lightpen.model.names import Method, Origin
 
 HEADER = "header.json"
 HEADER_LIMIT = MEGABYTE
@@ -91,16 +65,31 @@ class FileCopy(Struct, frozen=True, omit_defaults=True):
         return cls(path.name, sha256(data).hexdigest(), data)
 
 
-class RigCopies(Struct, frozen=True):
-    """Copies of the files of rig and other cameras."""
+@dataclass(frozen=True)
+class Names:
+    """Station, operator, serial number of the pen, tip, cone and ball diameter, mm."""
 
-    rig_file: FileCopy
-    camera_files: tuple[FileCopy, ...]
-    masks_px: tuple[tuple[Vector, ...], ...]  # as `Header.mask_px`
+    station: str = ""
+    operator: str = ""
+    pen: str = ""
+    tip: str = ""
+    cone: str = ""
+    ball_diameter: float | None = None
 
-    def __post_init__(self) -> None:
-        if not 1 <= len(self.camera_files) == len(self.masks_px):
-            raise ValueError("Each of the other cameras has a file and a mask.")
+
+class RecordedCamera(Struct, frozen=True, omit_defaults=True):
+    """A camera of a swing."""
+
+    file: FileCopy  # its intrinsics
+    mask_px: tuple[Vector, ...] = ()  # circles of stray light: centre x, y and radius
+    source: str = ""  # key of the source of its images
+    place: str = ""  # as `SourceChoice.place`
+    in_use: CameraInUse | None = None  # None of images from files
+
+    @property
+    def mask(self) -> FloatArray:
+        """Circles of stray light, (M, 3), px."""
+        return np.array(self.mask_px, dtype=float).reshape(-1, 3)
 
 
 class Header(Struct, frozen=True, kw_only=True):
@@ -109,28 +98,23 @@ class Header(Struct, frozen=True, kw_only=True):
     format: int = FORMAT
     created: ZonedTime
     program: str = ""
-    station: str = ""
-    operator: str = ""
-    tip: str = ""
-    cone: str = ""
-    camera_file: FileCopy
+    names: Names = Names()
+    cameras: Annotated[tuple[RecordedCamera, ...], Meta(min_length=1)]
+    rig_file: FileCopy | None = None  # of several cameras
     pen_file: FileCopy
     units: str | None = None  # units given for a pen file without units
     led_diameter_mm: Length | None = None  # replaces the pen file's
     nominal_tip_mm: Vector | None = None  # replaces the pen file's
-    mask_px: tuple[Vector, ...] = ()  # circles of stray light: centre x, y and radius
-    settings: Mapping[str, Plain] = {}  # further: exposure, limits, camera
-    rig: RigCopies | None = None
+    origin: Origin | None = None  # of the images; None if not stated
+    limits: SwingLimits = SwingLimits()
+    assumptions: Assumptions = USUAL
+    method: Method = "joint"  # of the reported tip
+    is_press_test: bool = False  # made to be compared with another swing alone
 
     def __post_init__(self) -> None:
         require_usual(self.created)
-        limits_in(self.settings)
-        recorded_assumptions(self.settings)
-
-    @property
-    def n_cameras(self) -> int:
-        """Number of cameras."""
-        return 1 if self.rig is None else 1 + len(self.rig.camera_files)
+        if (len(self.cameras) > 1) is (self.rig_file is None):
+            raise ValueError("Several cameras have a rig file, and one has none.")
 
     @property
     def nominal_tip(self) -> FloatArray | None:
@@ -139,28 +123,25 @@ class Header(Struct, frozen=True, kw_only=True):
         return None if tip is None else np.array(tip, dtype=np.float64)
 
     @property
-    def masks(self) -> tuple[FloatArray, ...]:
-        """Circles of stray light before each camera, (M, 3), px."""
-        all_masks = self.mask_px, *(() if self.rig is None else self.rig.masks_px)
-        return tuple(np.array(mask, dtype=float).reshape(-1, 3) for mask in all_masks)
+    def is_of_recording(self) -> bool:
+        """Whether the images were recorded before the swing."""
+        return self.cameras[0].source == Origin.RECORDED
+
+    @property
+    def settings(self) -> dict[str, Plain]:
+        """Limits and assumptions, as an entry of the archive has them."""
+        limits = StationLimits(swing=self.limits)
+        found = {e.key: limits.value(e) for e in LIMITS if e.part == "swing"}
+        return {**found, **asdict(self.assumptions), "method": self.method}
 
 
 def header_bytes(header: Header) -> bytes:
     """Return the bytes of a header, without the content of the files."""
-    rig = header.rig
-    if rig is not None:
-        rig = replace(
-            rig,
-            rig_file=replace(rig.rig_file, data=b""),
-            camera_files=tuple(replace(file, data=b"") for file in rig.camera_files),
-        )
-    entries = replace(
-        header,
-        camera_file=replace(header.camera_file, data=b""),
-        pen_file=replace(header.pen_file, data=b""),
-        rig=rig,
-    )
-    text = json.dumps(to_builtins(entries), indent=1, ensure_ascii=False)
+    entries = to_builtins(header)
+    copies = [entries["pen_file"], *(each["file"] for each in entries["cameras"])]
+    for copy in (*copies, entries["rig_file"] or {}):
+        copy.pop("data", None)
+    text = json.dumps(entries, indent=1, ensure_ascii=False)
     # The bytes of a file name that is no text become JSON escapes.
     return with_checksum(text.encode("utf-8", "backslashreplace"))
 
@@ -191,11 +172,10 @@ def read_header(folder: Path) -> Header:
 
 def header_copies(header: Header) -> Mapping[str, FileCopy]:
     """Return the copies in a record by their relative path."""
-    by_stem = {CAMERA_STEM: header.camera_file, PEN_STEM: header.pen_file}
-    if header.rig is not None:
-        by_stem[RIG_STEM] = header.rig.rig_file
-        for c, file in enumerate(header.rig.camera_files, start=1):
-            by_stem[camera_stem(c)] = file
+    by_stem = {camera_stem(c): each.file for c, each in enumerate(header.cameras)}
+    by_stem[PEN_STEM] = header.pen_file
+    if header.rig_file is not None:
+        by_stem[RIG_STEM] = header.rig_file
     return {copy_name(stem, file): file for stem, file in by_stem.items()}
 
 
@@ -214,41 +194,8 @@ def damaged_file(path: Path) -> FileError:
     return FileError("record.damaged", path=path)
 
 
-def limits_in(settings: Mapping[str, Plain]) -> SwingLimits:
-    """Return the limits in the settings of a header; `ValueError` if there are none."""
-    usual = SwingLimits()
-    return SwingLimits(
-        max_uncertainty=number_in(
-            settings, "max_uncertainty_mm", usual.max_uncertainty
-        ),
-        min_images=int(number_in(settings, "min_images", usual.min_images)),
-        max_images=int(number_in(settings, "max_images", usual.max_images)),
-        min_per_field=int(number_in(settings, "min_per_field", usual.min_per_field)),
-        spacing=number_in(settings, "spacing_rad", usual.spacing),
-        requires_temperature=bool(settings.get("requires_temperature", False)),
-    )
-
-
-def number_in(settings: Mapping[str, Plain], key: str, usual: float) -> float:
-    """Return a number of a record's settings, or its default."""
-    value = settings.get(key)
-    return value if isinstance(value, int | float) else usual
-
-
 UNFIT = re.compile(r"[^\w.-]+")  # for the name of a folder
 LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may have
-
-
-@dataclass(frozen=True)
-class Names:
-    """Station, operator, serial number of the pen, tip, cone and ball diameter, mm."""
-
-    station: str = ""
-    operator: str = ""
-    pen: str = ""
-    tip: str = ""
-    cone: str = ""
-    ball_diameter: float | None = None
 
 
 def folder_name(names: Names, now: datetime) -> str:

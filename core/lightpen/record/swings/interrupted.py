@@ -17,7 +17,6 @@ from lightpen.record.swings.reading import (
     IMAGES,
     JOURNAL,
     Record,
-    is_press_test,
     last_verdict,
     open_record,
 )
@@ -111,7 +110,7 @@ def _read_unfinished(folder: Path) -> Record | None:
     # A crash leaves no more than one image without a line.
     if not record.images and n_images > 1:
         raise FileError("unfinished.unknown-images", journal=journal, n_images=n_images)
-    is_over = record.verdict is not None or is_press_test(record)
+    is_over = record.verdict is not None or record.header.is_press_test
     return record if record.images and not is_over else None
 
 

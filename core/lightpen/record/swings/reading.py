@@ -49,17 +49,7 @@ from lightpen.formats.own_json import (
     with_checksum,
 )
 from lightpen.messages import message
-from lightpen.model.limits import SwingLimits
-from lightpen.model.names import Origin
-from lightpen.record.swings.header import (
-    HEADER,
-    Header,
-    Names,
-    header_copies,
-    limits_in,
-    number_in,
-    read_header,
-)
+from lightpen.record.swings.header import HEADER, Header, header_copies, read_header
 
 # The journal of a swing: a line for each thing that happened, appended, never changed.
 #
@@ -238,7 +228,6 @@ def _is_whole(line: bytes) -> bool:
 IMAGES = "images"
 OPENER = "swing.lightpen"  # by its suffix the system knows the program
 DISCARDED = "discarded"
-PRESS_TEST = "press_test"  # among the settings: made to be compared with another
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +290,7 @@ def open_record(folder: Path) -> Record:
         if isinstance(line, RecordedImage):
             others = (len(other.pixels) for other in line.others)
             n_seen = [len(line.pixels), *others]
-            is_whole = n_seen == header.n_cameras * [n_leds]
+            is_whole = n_seen == len(header.cameras) * [n_leds]
             if line.number <= last or not is_whole:
                 raise damaged_line(folder, number)
             last = line.number
@@ -336,7 +325,7 @@ def record_files(record: Record) -> tuple[Path, ...]:
     images = (
         record.folder / image_name(image.number, c)
         for image in record.images
-        for c in range(header.n_cameras)
+        for c in range(len(header.cameras))
     )
     return (*(record.folder / name for name in names), *images)
 
@@ -354,7 +343,7 @@ def unacknowledged_images(record: Record) -> tuple[str, ...]:
 
     A crash, or a journal that was cut, leaves them; they take no part.
     """
-    cameras = range(record.header.n_cameras)
+    cameras = range(len(record.header.cameras))
     known = {image_name(image.number, c) for image in record.images for c in cameras}
     found = (
         f"{images_folder(c)}/{path.name}"
@@ -378,37 +367,3 @@ def _points(pixels: Sequence[tuple[float, float] | None]) -> FloatArray:
     """Return LED centres (L, 2), px; NaN where an LED was not seen."""
     points = [(np.nan, np.nan) if p is None else p for p in pixels]
     return np.array(points, dtype=np.float64).reshape(-1, 2)
-
-
-def recorded_names(record: Record) -> Names:
-    """Return station, operator, pen, tip and cone of a record."""
-    header = record.header
-    return Names(
-        station=header.station,
-        operator=header.operator,
-        pen=str(header.settings.get("pen", "")),
-        tip=header.tip,
-        cone=header.cone,
-        ball_diameter=number_in(header.settings, "ball_diameter_mm", 0.0) or None,
-    )
-
-
-def recorded_origin(record: Record) -> Origin | None:
-    """Return the origin of the images of a record; None if not stated."""
-    stated = record.header.settings.get("origin")
-    return Origin(stated) if stated in set(Origin) else None
-
-
-def is_of_recording(record: Record) -> bool:
-    """Return whether the images of a record were recorded before its swing."""
-    return record.header.settings.get("source") == Origin.RECORDED
-
-
-def is_press_test(record: Record) -> bool:
-    """Return whether a swing was made to be compared with another alone."""
-    return record.header.settings.get(PRESS_TEST) is True
-
-
-def recorded_limits(record: Record) -> SwingLimits:
-    """Return the limits of a record's swing."""
-    return limits_in(record.header.settings)

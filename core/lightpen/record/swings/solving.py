@@ -44,16 +44,8 @@ from lightpen.record.swings.header import (
     RIG_STEM,
     camera_stem,
     copy_name,
-    recorded_assumptions,
-    recorded_method,
 )
-from lightpen.record.swings.reading import (
-    Record,
-    image_name,
-    is_record,
-    open_record,
-    recorded_origin,
-)
+from lightpen.record.swings.reading import Record, image_name, is_record, open_record
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,32 +72,29 @@ class RecordSource:
 def source(record: Record) -> RecordSource:
     """Return the input of the calibration of a record."""
     header = record.header
-    camera_file = record.folder / copy_name(CAMERA_STEM, header.camera_file)
     pen_file = record.folder / copy_name(PEN_STEM, header.pen_file)
-
+    camera_files = tuple(
+        record.folder / copy_name(camera_stem(c), each.file)
+        for c, each in enumerate(header.cameras)
+    )
     rig_file, rig = None, None
-    camera_files: tuple[Path, ...] = (camera_file,)
-    if header.rig is not None:
-        rig_file = record.folder / copy_name(RIG_STEM, header.rig.rig_file)
-        camera_files += tuple(
-            record.folder / copy_name(camera_stem(c), file)
-            for c, file in enumerate(header.rig.camera_files, start=1)
-        )
+    if header.rig_file is not None:
+        rig_file = record.folder / copy_name(RIG_STEM, header.rig_file)
         rig = read_rig(rig_file, camera_files).rig
     images = [_images_of(record, c) for c in range(len(camera_files))]
     return RecordSource(
         folder=record.folder,
         images=images[0],
-        camera=read_camera(camera_file) if rig is None else rig.cameras[0],
+        camera=read_camera(camera_files[0]) if rig is None else rig.cameras[0],
         pen=read_pen(
             pen_file, header.units, header.led_diameter_mm, header.nominal_tip
         ),
-        masks=header.masks,
+        masks=tuple(each.mask for each in header.cameras),
         camera_files=camera_files,
         pen_file=pen_file,
-        assumptions=recorded_assumptions(header.settings),
-        method=recorded_method(header.settings),
-        origin=recorded_origin(record),
+        assumptions=header.assumptions,
+        method=header.method,
+        origin=header.origin,
         units=header.units,
         led_diameter=header.led_diameter_mm,
         rig=rig,
@@ -132,11 +121,10 @@ def _images_of(record: Record, c: int) -> ImageSource:
 
 def _full_scale(record: Record, c: int) -> int | None:
     """Return the full scale of the c-th camera's pixel format; None: not known."""
-    prefix = "" if c == 0 else "second_"
-    settings = record.header.settings
-    name = str(settings.get(f"{prefix}pixel_format", ""))
-    is_container = settings.get(f"{prefix}source") == Origin.RECORDED
-    pixel_format = pixel_format_named(name)
+    camera = record.header.cameras[c]
+    used = None if camera.in_use is None else camera.in_use.settings.pixel_format
+    is_container = camera.source == Origin.RECORDED
+    pixel_format = None if used is None else pixel_format_named(used)
     if pixel_format is None or (is_container and pixel_format.bits == 16):
         return None
     return pixel_format.full_scale
@@ -389,8 +377,8 @@ def files_beside(place: str) -> FilesBeside:
         if is_record(folder):
             header = open_record(folder).header
             return FilesBeside(
-                folder / copy_name("camera", header.camera_file),
-                folder / copy_name("pen", header.pen_file),
+                folder / copy_name(CAMERA_STEM, header.cameras[0].file),
+                folder / copy_name(PEN_STEM, header.pen_file),
             )
         return FilesBeside(_first(folder, CAMERA_FILES), _first(folder, PEN_FILES))
     return FilesBeside()
@@ -405,7 +393,7 @@ def is_simulated_recording(place: str) -> bool:
         if folder.name == IMAGE_FOLDER:
             folder = folder.parent
         return is_record(folder) and (
-            recorded_origin(open_record(folder)) is Origin.SIMULATED
+            open_record(folder).header.origin is Origin.SIMULATED
         )
     return False
 

@@ -136,7 +136,7 @@ class RecordWriter:
             stack.callback(writer.close)
             copies = header_copies(header)
             try:
-                for c in range(header.n_cameras):
+                for c in range(len(header.cameras)):
                     (folder / images_folder(c)).mkdir()
             except OSError as error:
                 raise _unwritable(folder, error) from error
@@ -159,7 +159,7 @@ class RecordWriter:
         Raises `FileError` if another program writes to the record or did so since.
         """
         writer = cls(record.folder, record.next_number, record.length)
-        for c in range(record.header.n_cameras):
+        for c in range(len(record.header.cameras)):
             sweep_parts(record.folder / images_folder(c))
         return writer
 

@@ -36,14 +36,12 @@ from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rig_of
 from lightpen.record.calibrations import CalibrationFile
-from lightpen.record.swings.header import recorded_assumptions
 from lightpen.record.swings.reading import (
     Record,
     RecordedImage,
     image_name,
     is_record,
     open_record,
-    recorded_origin,
 )
 from lightpen.record.swings.solving import RecordSource, is_simulated_recording, source
 from lightpen_extensions.measure.probing.probing import (
@@ -134,14 +132,14 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
         return ImageLocation(
             name=where[0],
             images=(own.images, *own.other_images),
-            origin=recorded_origin(record),
+            origin=record.header.origin,
             viewers=_recorded_viewers(own),
             pen=own.pen,
             pen_file=own.pen_file,
             masks=own.masks,
             held=held_in(record),
-            operator=record.header.operator,
-            conditions=recorded_assumptions(record.header.settings),
+            operator=record.header.names.operator,
+            conditions=record.header.assumptions,
         )
     is_simulated = is_simulated_recording(where[0])
     origin = Origin.SIMULATED if is_simulated else Origin.RECORDED

@@ -47,7 +47,7 @@ from lightpen.model.names import Laboratory, Origin
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.results import Result
-from lightpen.record.swings.header import PREFIX, Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.record.swings.solving import Solution, solve_again, solve_record, source
 from lightpen.record.swings.writing import RecordWriter
@@ -173,8 +173,8 @@ def content_of(folder: Path) -> str:
     """Return the checksum of all that state and tip of a swing depend on."""
     header = json.loads((folder / "header.json").read_bytes())
     del header["checksum"]
-    for judged_by in ("max_uncertainty_mm", "origin"):
-        header["settings"].pop(judged_by, None)
+    for judged_by in ("limits", "origin"):
+        del header[judged_by]
     checksum = sha256(json.dumps(header).encode())
     for file in sorted(folder.rglob("*")):
         if file.is_file() and file.name != "header.json":
@@ -198,8 +198,8 @@ class Bed:
         """Solve the swing, with a limit of U, mm."""
         workbench = self.workbench
         folder = workbench.run.records_folder / "swing"
-        settings = {"max_uncertainty_mm": limit, "origin": self.origin}
-        self.rewrite_header(folder, settings)
+        limits = {"max_uncertainty": limit}
+        self.rewrite_header(folder, limits=limits, origin=self.origin)
         before = workbench.run.status.assessment
         resumable = self.solved_once.read(folder)
         workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
@@ -506,7 +506,7 @@ def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
     bed: Bed,
 ) -> None:
     folder = bed.workbench.run.records_folder / "swing"
-    bed.rewrite_header(folder, {PREFIX + "form_error": 0.002})
+    bed.rewrite_header(folder, assumptions={"form_error": 0.002})
     bed.solve_uncertain()
     page = bed.show()
 

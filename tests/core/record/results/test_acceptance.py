@@ -38,7 +38,7 @@ from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import HEADER, header_bytes, read_header
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.reading import open_record, recorded_names
+from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import (
     Solution,
     load_image,
@@ -64,7 +64,7 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.record.results.acceptance import accept
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.swings.reading import (open_record, recorded_names)
+from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import solve_record
 
 STEPS = {
@@ -98,7 +98,7 @@ def run(order, number, data):
     try:
         archive, now = FolderArchive(Path(data)), datetime(2026, 1, 2, 13, tzinfo=UTC)
         if takes_back:
-            names = recorded_names(open_record(folder))
+            names = open_record(folder).header.names
             archive.revoke(archive.in_force(names.pen, names.tip), "Ann", now)
         else:
             accept(archive, swing, now, "The tip was exchanged.")
@@ -127,7 +127,7 @@ def swing(
     """A data folder with a swing whose tip can be accepted; copy it to change it."""
     data = tmp_path_factory.mktemp("accepting") / "data"
     folder = Path(shutil.copytree(swung(), data / RECORDS / "swing"))
-    rewrite_header(folder, {"max_uncertainty_mm": 1.0, "origin": Origin.LIVE})
+    rewrite_header(folder, limits={"max_uncertainty": 1.0}, origin=Origin.LIVE)
     return data
 
 
@@ -154,7 +154,7 @@ class Case:
         self.data, self.records = data, data / RECORDS
         self.folder = self.records / "swing"
         self.archive = FolderArchive(data)
-        self.names = recorded_names(open_record(self.folder))
+        self.names = open_record(self.folder).header.names
         source = replace(solution.source, folder=self.folder)
         self.solution = replace(solution, source=source)
         self.archive.store(
@@ -268,7 +268,7 @@ def test_the_result_holds_what_the_command_line_writes_of_the_record(
 def test_a_tip_that_must_be_repeated_is_refused_whatever_the_reason(
     case: Case, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(case.folder, {"max_uncertainty_mm": 1e-9})
+    rewrite_header(case.folder, limits={"max_uncertainty": 1e-9})
 
     with pytest.raises(AcceptanceError, match="The tip cannot be accepted"):
         case.accept()
@@ -326,7 +326,7 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
     u = passing.calibration.budget.expanded_uncertainty[:3]
     _put_in_force(case, tip - 0.9 * np.hypot(u, u), u)  # which U explains
     limit = 0.5 * float(np.linalg.norm(u))
-    name = recorded_names(open_record(passing.source.folder)).tip
+    name = open_record(passing.source.folder).header.names.tip
     data = case.archive.folder.parent
     add_item(data, ListedTip(id=name, max_change_mm=limit), Author(), NOON)
 
@@ -347,7 +347,7 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
 
 
 def test_an_overdue_cone_is_reported_with_the_result(case: Case) -> None:
-    cone = recorded_names(open_record(case.folder)).cone
+    cone = open_record(case.folder).header.names.cone
     data = case.archive.folder.parent
     add_item(data, ListedCone(id=cone, due=date(2020, 1, 1)), Author(), NOON)
 
@@ -365,7 +365,7 @@ def test_a_retired_tip_is_not_put_in_force_however_it_is_typed(
     case: Case, spelling: str
 ) -> None:
     passing = _passing(case)
-    assert recorded_names(open_record(passing.source.folder)).tip == "T-10"
+    assert open_record(passing.source.folder).header.names.tip == "T-10"
     _retitled(case, spelling)
     data = case.archive.folder.parent
     add_item(data, ListedTip(id="T-10"), Author(), NOON)
@@ -389,7 +389,8 @@ def test_a_tip_is_accepted_by_the_name_that_is_known(
 
 def _retitled(case: Case, tip: str) -> None:
     """Write another spelling of the tip into the header of the swing."""
-    header = structs.replace(read_header(case.folder), tip=tip)
+    header = read_header(case.folder)
+    header = structs.replace(header, names=replace(header.names, tip=tip))
     (case.folder / HEADER).write_bytes(header_bytes(header))
 
 
@@ -428,7 +429,7 @@ def test_a_tip_that_cannot_be_compared_is_to_be_checked(case: Case) -> None:
 def test_a_simulated_tip_is_never_in_force_for_a_pen(
     case: Case, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(case.folder, {"origin": Origin.SIMULATED})
+    rewrite_header(case.folder, origin=Origin.SIMULATED)
     result = case.accept()
 
     assert result.origin is Origin.SIMULATED
@@ -696,7 +697,8 @@ def guarded(swing: Path, solved: Solution, tmp_path: Path) -> tuple[Path, Soluti
 
 def named(folder: Path, station: str) -> None:
     """Write another station into the header of a swing, with its checksum."""
-    header = structs.replace(read_header(folder), station=station)
+    header = read_header(folder)
+    header = structs.replace(header, names=replace(header.names, station=station))
     (folder / HEADER).write_bytes(header_bytes(header))
 
 

@@ -16,13 +16,20 @@ import pytest
 from msgspec import structs
 
 from lightpen.arrays import Image
+from lightpen.cameras.protocol import CameraInUse, CameraSettings
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.formats.rig_files import write_camera
 from lightpen.model.names import Origin
-from lightpen.record.swings.header import FileCopy, Header, header_copies
+from lightpen.record.swings.header import (
+    FileCopy,
+    Header,
+    Names,
+    RecordedCamera,
+    header_copies,
+)
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, record_files
 from lightpen.record.swings.solving import source
@@ -52,17 +59,18 @@ def header(tmp_path: Path) -> Header:
     write_camera(paper_camera(), tmp_path / "station 3.YAML")
     write_pen(paper_pen(), tmp_path / "lp04.json")
     return Header(
-        camera_file=FileCopy.of(tmp_path / "station 3.YAML", CAMERA_FILE),
+        cameras=(
+            RecordedCamera(
+                FileCopy.of(tmp_path / "station 3.YAML", CAMERA_FILE),
+                mask_px=((10.0, 20.0, 5.5),),
+                in_use=CameraInUse("7", CameraSettings(exposure_us=3000.0)),
+            ),
+        ),
         pen_file=FileCopy.of(tmp_path / "lp04.json", PEN_FILE),
         created=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
         program="lightpen 0.1.0",
-        station="Halle 3",
-        operator="Jörg",
-        tip="T-17, 3 mm",
-        cone="A",
+        names=Names("Halle 3", "Jörg", "LP-04", "T-17, 3 mm", "A"),
         nominal_tip_mm=(0.1, -90.0, -25.0),
-        mask_px=((10.0, 20.0, 5.5),),
-        settings={"exposure_us": 3000.0},
     )
 
 
@@ -97,9 +105,10 @@ def test_all_that_was_recorded_is_read_back_to_the_last_digit(
     np.testing.assert_array_equal(record.images[2].translation, np.ones(3) / 7)
     for seed, load in enumerate(source(record).images.open()):
         np.testing.assert_array_equal(load(), dark_image(seed))
-    camera = structs.replace(header.camera_file, data=b"")
+    (camera,) = header.cameras
+    camera = structs.replace(camera, file=structs.replace(camera.file, data=b""))
     pen = structs.replace(header.pen_file, data=b"")
-    assert record.header == structs.replace(header, camera_file=camera, pen_file=pen)
+    assert record.header == structs.replace(header, cameras=(camera,), pen_file=pen)
     for name, copy in header_copies(header).items():
         assert (record.folder / name).read_bytes() == copy.data != b""
 
@@ -120,8 +129,10 @@ def test_images_of_a_record_have_the_full_scale_of_their_pixel_format(
     origin: Origin,
     full_scale: int | None,
 ) -> None:
-    settings = {"pixel_format": pixel_format, "source": str(origin)}
-    header = structs.replace(header, settings=settings)
+    used = CameraInUse("7", CameraSettings(pixel_format=pixel_format))
+    (camera,) = header.cameras
+    camera = structs.replace(camera, source=str(origin), in_use=used)
+    header = structs.replace(header, cameras=(camera,))
     record = open_record(recorded(tmp_path / "swing", header, 1))
     assert source(record).images.full_scale == full_scale
 
@@ -138,7 +149,7 @@ def test_the_record_brings_its_own_camera_and_pen(
     assert found.camera.fx == paper_camera().fx
     np.testing.assert_array_equal(found.pen.leds, paper_pen().leds)
     np.testing.assert_array_equal(found.pen.nominal_tip, header.nominal_tip)
-    np.testing.assert_array_equal(found.masks[0], header.masks[0])
+    np.testing.assert_array_equal(found.masks[0], header.cameras[0].mask)
 
 
 @pytest.mark.slow
