@@ -68,7 +68,7 @@ def event_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     event = Event(
         kind=Kind.TAKEN_BACK,
         at=found.at,
-        names=Names(operator=found.operator, pen=found.pen, tip=found.tip),
+        names=found.names,
         program=this_program(),
         reason=found.reason,
         settings={"supervisor": found.supervisor} if found.supervisor else {},

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from hashlib import sha256
 from math import isfinite
+from pathlib import Path
 from threading import Lock
 from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar, Union
 
@@ -76,9 +77,17 @@ def in_shape(tree: Any, shape: type[T]) -> T:
     """Convert a parsed value; see `parse_own_json`."""
     try:
         with _ONE_READER:
-            return convert(tree, shape)
+            return convert(tree, shape, dec_hook=_path)
     except (ValueError, OverflowError, RecursionError) as error:
         raise DamagedError(str(error)) from error
+
+
+def _path(kind: type, value: Any) -> Path:
+    """Return a path in the field of a type, which `msgspec` does not know."""
+    if kind is not Path or not isinstance(value, str):
+        raise ValueError(f"{value} is no path.")
+    require_path(value)
+    return Path(value)
 
 
 def with_checksum(text: bytes) -> bytes:

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import date, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -242,21 +242,9 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
     digest = sha256(data).hexdigest()
     if CALIBRATION in data:
         result = parse_result(data, path, Path)
-        return CalibrationFile(
-            path=path,
-            sha256=digest,
-            calibration=result.calibration,
-            grade=result.grade,
-            why=result.why or result.calibration.verdict,
-            doubts=result.doubts,
-            origin=result.origin,
-            names=result.names,
-            accepted=result.accepted,
-            reason=result.reason,
-            change=result.change,
-            swing=result.record,
-            supervisor=result.supervisor,
-        )
+        judged = {e.name: getattr(result, e.name) for e in fields(JudgedCalibration)}
+        judged["why"] = result.why or result.calibration.verdict
+        return CalibrationFile(path=path, sha256=digest, swing=result.record, **judged)
     record = _parse_record(data, path)
     verdict = record.verdict
     return CalibrationFile(

@@ -9,6 +9,7 @@ own folder.
 import logging
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -101,9 +102,7 @@ class FolderArchive:
         withdrawal = Withdrawal(
             file.stem,
             now,
-            operator,
-            names.pen,
-            names.tip,
+            replace(names, operator=operator),
             reason.strip(),
             supervisor=""
             if signature is None or key is None
@@ -128,7 +127,11 @@ class FolderArchive:
     ) -> Path | None:
         """Return the file of what `in_force` returns."""
         for file, heading in self._unrevoked(self._root(is_simulated)):
-            if _may_be(heading.pen, pen) and _may_be(heading.tip, tip):
+            names = heading.names
+            if names is None or (
+                folded_name(names.pen) == folded_name(pen)
+                and folded_name(names.tip) == folded_name(tip)
+            ):
                 return file
         return None
 
@@ -138,7 +141,7 @@ class FolderArchive:
         return tuple(
             file
             for file, heading in self._unrevoked(root, passes_over_damage=True)
-            if heading.pen is not None and _may_be(heading.pen, pen)
+            if heading.names and folded_name(heading.names.pen) == folded_name(pen)
         )
 
     def supervision(self) -> Supervision:
@@ -235,11 +238,6 @@ def _counted_heading(
     if heading.supervisor:
         counted.require_approved(present)
     return heading
-
-
-def _may_be(stated: str | None, name: str) -> bool:
-    """Return whether a name is the stated one; every name is if none is stated."""
-    return stated is None or folded_name(stated) == folded_name(name)
 
 
 def _is_same(one: Result, other: Result) -> bool:

@@ -10,8 +10,7 @@ revokes it is a separate file, a head without a calibration.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass, field, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -26,7 +25,6 @@ from lightpen.estimation.reports.verdict import Change, Grade
 from lightpen.formats.own_json import (
     FORMAT,
     DamagedError,
-    Digest,
     LaterFormatError,
     StoredMessage,
     Vector,
@@ -52,11 +50,9 @@ class ResultHeading(Struct):
     """The heading of a result, for look-ups."""
 
     format: Annotated[int, Meta(ge=1)]
-    pen: str | None = None  # as in `Names`; None if a later version omits it
-    tip: str | None = None  # the same
+    names: Names | None = None  # None if a later version omits it
     record: str | None = None  # as in `Result`, the same
     takes_back: str | None = None  # revoked file, without suffix
-    origin: str | None = None
     supervisor: str = ""
 
     def __post_init__(self) -> None:
@@ -68,9 +64,7 @@ class Withdrawal(Struct, frozen=True):
 
     takes_back: str
     at: ZonedTime
-    operator: str
-    pen: str
-    tip: str
+    names: Names  # pen, tip, and the operator who revokes it
     reason: str = ""
     supervisor: str = ""
 
@@ -119,35 +113,6 @@ def _vector(values: FloatArray) -> Vector:
     return x, y, z
 
 
-class _Head(Struct):
-    format: int
-    accepted: ZonedTime
-    station: str
-    operator: str
-    pen: str
-    tip: str
-    cone: str
-    ball_diameter_mm: float | None
-    grade: Grade
-    record: str
-    images: tuple[int, ...]
-    origin: Origin | None
-    reason: str
-    supervisor: str
-    why: StoredMessage | None
-    doubts: tuple[StoredMessage, ...]
-    change: TipChange | None
-    calibration_sha256: Digest
-
-    def __post_init__(self) -> None:
-        require_usual(self.accepted)
-        require_path(self.record)
-
-
-class _Whole(_Head):
-    calibration: CalibrationRecord
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JudgedCalibration:
     """A calibration with the verdict on it, accepted or not."""
@@ -155,13 +120,17 @@ class JudgedCalibration:
     calibration: CalibrationRecord
     grade: Grade
     names: Names = field(default_factory=Names)  # empty if nobody accepted it
-    accepted: datetime | None = None
+    accepted: ZonedTime | None = None
     origin: Origin | None = None  # None if neither it nor its swing states it
     reason: str = ""  # why it was accepted though it does not pass, by who did
     why: StoredMessage | None = None
     doubts: tuple[StoredMessage, ...] = ()
     change: TipChange | None = None  # since the previous result, if any
     supervisor: str = ""  # who approved it; empty if not needed
+
+    def __post_init__(self) -> None:
+        if self.accepted is not None:
+            require_usual(self.accepted)
 
     @property
     def nominal_tip(self) -> FloatArray | None:
@@ -185,7 +154,7 @@ class Result(JudgedCalibration):
     """An accepted calibration."""
 
     names: Names
-    accepted: datetime
+    accepted: ZonedTime
     record: Path  # folder of the swing that it comes from
     images: tuple[int, ...]  # not excluded
 
@@ -197,28 +166,14 @@ class Result(JudgedCalibration):
 
 def result_bytes(result: Result, record: str) -> bytes:
     """Return a result as JSON, with the path of the swing's folder as written there."""
-    names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
-    head = _Head(
-        format=FORMAT,
-        accepted=result.accepted,
-        station=names.station,
-        operator=names.operator,
-        pen=names.pen,
-        tip=names.tip,
-        cone=names.cone,
-        ball_diameter_mm=names.ball_diameter,
-        grade=result.grade,
-        record=record,
-        images=result.images,
-        origin=result.origin,
-        reason=result.reason,
-        supervisor=result.supervisor,
-        why=result.why,
-        doubts=result.doubts,
-        change=result.change,
-        calibration_sha256=sha256(rest).hexdigest(),
-    )
+    head = {
+        "format": FORMAT,
+        **{each.name: getattr(result, each.name) for each in fields(result)},
+        "record": record,
+        "calibration_sha256": sha256(rest).hexdigest(),
+    }
+    del head["calibration"]
     return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
 
 
@@ -256,30 +211,10 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         parse_checked(head, ResultHeading)
         whole = parse_own_json(data, dict[str, Any])
         require_format(whole)
-        entries = in_shape(whole, _Whole)
-        if sha256(data[len(head) - 1 :]).hexdigest() != entries.calibration_sha256:
+        result = in_shape(whole, Result)
+        if sha256(data[len(head) - 1 :]).hexdigest() != whole.get("calibration_sha256"):
             raise DamagedError("The checksum of the calibration is another one.")
-        return Result(
-            names=Names(
-                station=entries.station,
-                operator=entries.operator,
-                pen=entries.pen,
-                tip=entries.tip,
-                cone=entries.cone,
-                ball_diameter=entries.ball_diameter_mm,
-            ),
-            accepted=entries.accepted,
-            grade=entries.grade,
-            record=locate(entries.record),
-            images=entries.images,
-            calibration=entries.calibration,
-            origin=entries.origin,
-            reason=entries.reason,
-            supervisor=entries.supervisor,
-            why=entries.why,
-            doubts=entries.doubts,
-            change=entries.change,
-        )
+        return replace(result, record=locate(str(result.record)))
     except LaterFormatError as error:
         raise _of_later_version(file, error.number) from error
     except DamagedError as error:

@@ -453,7 +453,7 @@ def test_what_is_taken_back_is_kept_and_the_tip_before_in_force_again(
     kept = [path.read_bytes() for path in case.archive.folder.glob("*.json")]
     assert set(before) < set(kept)
     newest = json.loads(max(case.archive.folder.glob("*.json")).read_bytes())
-    assert (newest["takes_back"], newest["operator"]) == ("000002", "Ben")
+    assert (newest["takes_back"], newest["names"]["operator"]) == ("000002", "Ben")
 
 
 def test_what_was_taken_back_can_be_accepted_again_and_taken_back_again(

@@ -251,7 +251,7 @@ def test_a_damaged_result_is_reported_and_not_passed_over(
     [
         ("accepted", "yesterday"),
         ("accepted", "2026-01-02T12:00:00"),
-        ("ball_diameter_mm", "wide"),
+        ("names", {"ball_diameter": "wide"}),
         ("images", 5),
         ("calibration", []),
         ("format", None),
@@ -377,7 +377,7 @@ def test_a_ball_diameter_that_is_not_known_is_stored_as_none(
     archive.store(replace(result(), names=replace(NAMES, ball_diameter=None)))
 
     (file,) = files_of(archive)
-    assert json.loads(file.read_bytes())["ball_diameter_mm"] is None
+    assert json.loads(file.read_bytes())["names"]["ball_diameter"] is None
     assert in_force(archive).names.ball_diameter is None
 
 

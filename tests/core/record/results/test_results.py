@@ -56,7 +56,7 @@ def test_the_head_tells_whose_it_is() -> None:
 
     heading = parse_heading(written, FILE)
     assert heading.format == FORMAT
-    assert (heading.pen, heading.tip) == ("LP-04", "T-10")
+    assert heading.names == RESULT.names
     assert heading.record == "records/1"
     assert list(json.loads(written))[-2:] == ["checksum", "calibration"]
 
@@ -67,7 +67,7 @@ def test_the_head_tells_whose_it_is() -> None:
 def test_a_name_like_the_end_of_the_head_is_no_end(text: str) -> None:
     named = replace(RESULT, names=replace(RESULT.names, pen=text))
 
-    assert parse_heading(result_bytes(named, "records/1"), FILE).pen == text
+    assert parse_heading(result_bytes(named, "records/1"), FILE).names == named.names
 
 
 def test_each_image_has_a_line_of_its_own_to_be_read_by_people() -> None:
