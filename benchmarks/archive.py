@@ -25,16 +25,18 @@ from lightpen.archive.chains import (
     ChainHead,
     Event,
     Kind,
+    append,
     chained,
     entry_signature,
+    own_chain,
     text_sha256,
 )
 from lightpen.archive.checks import check_archive
-from lightpen.archive.growth import append, copy_entries, own_chain
 from lightpen.archive.history import EntryFilter, last_accepted, newest
 from lightpen.archive.store import Database, open_file
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.header import Names
+from lightpen_extensions.plant.copies import copy_entries
 
 N_ENTRIES, N_TIPS = 100_000, 40
 RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images

@@ -39,8 +39,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
-from lightpen.archive.chains import Event, Kind
-from lightpen.archive.growth import append
+from lightpen.archive.chains import Event, Kind, append
 from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats, sealed
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen

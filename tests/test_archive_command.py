@@ -11,7 +11,7 @@ from subprocess import CompletedProcess
 import pytest
 from tests.core.archive.conftest import accepted
 
-from lightpen.archive.growth import append, own_chain
+from lightpen.archive.chains import append, own_chain
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import open_file
 from lightpen.commands.arguments import PASSWORD
@@ -88,10 +88,9 @@ def test_an_entry_that_was_changed_is_marked_and_not_passed_on(
 
     listed = lightpen("archive", "list", "--data", data).stdout.splitlines()
     assert [line.endswith("CHANGED") for line in listed] == [False, True, False]
-    for words in (("list", "--csv"), ("export", tmp_path / "all.jsonl")):
-        refused = lightpen("archive", *words, "--data", data)
-        assert refused.returncode == 2
-        assert "Entry 2 of the archive" in refused.stderr
+    refused = lightpen("archive", "list", "--csv", "--data", data)
+    assert refused.returncode == 2
+    assert "Entry 2 of the archive" in refused.stderr
 
 
 def test_entries_are_listed_as_a_table(lightpen: Run, data: Path) -> None:
@@ -106,14 +105,6 @@ def test_entries_of_other_pens_are_left_out(lightpen: Run, data: Path) -> None:
     other = lightpen("archive", "list", "--pen", "LP-05", "--data", data)
 
     assert other.stdout.strip() == ""
-
-
-def test_all_entries_are_exported(lightpen: Run, data: Path, tmp_path: Path) -> None:
-    file = tmp_path / "all.jsonl"
-    exported = lightpen("archive", "export", file, "--data", data)
-
-    assert exported.stdout == f"3 entries are in {file}.\n"
-    assert len(file.read_text().splitlines()) == 5
 
 
 def test_delivering_needs_a_server(

@@ -31,7 +31,6 @@ from lightpen.archive.chains import (
     chain_head,
     chained,
     columns_of,
-    entries_of,
 )
 from lightpen.archive.checks import check_file
 from lightpen.archive.logbook import Logbook
@@ -59,6 +58,7 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.library.tip_library import ItemKind, ListedTip, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen_extensions.plant.copies import entries_of
 
 EVE = Signature("Eve", "correct horse")
 BY = Author("Hall 2", "Ann", signature=EVE)

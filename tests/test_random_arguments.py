@@ -120,7 +120,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with an archive of one entry."""
     from tests.core.archive.conftest import accepted
 
-    from lightpen.archive.growth import append, own_chain
+    from lightpen.archive.chains import append, own_chain
     from lightpen.archive.store import open_file
 
     folder = tmp_path_factory.mktemp("archive") / "data"

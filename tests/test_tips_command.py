@@ -8,12 +8,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from lightpen.archive.chains import Kind, entries_of
-from lightpen.archive.growth import own_chain
+from lightpen.archive.chains import Kind, own_chain
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import open_file
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision import LIMITS_FOLDER, Signature, set_password
+from lightpen_extensions.plant.copies import entries_of
 
 Run = Callable[..., CompletedProcess[str]]
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.chains import Event, chain_at_home, entries_of
+from lightpen.archive.chains import Event, chain_at_home
 from lightpen.archive.store import look_into
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -23,6 +23,7 @@ from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     simulate_centers,

@@ -194,7 +194,7 @@ def _parser(
     for name, help_text, add_options in (
         (
             "archive",
-            "check, list, export and import entries",
+            "check, list, deliver and fetch entries",
             partial(add_archive, extensions=extensions),
         ),
         ("tips", "manage the library of pens, tips and cones", add_tips),

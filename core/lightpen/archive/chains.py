@@ -1,15 +1,17 @@
 """Chains of signed entries, each with the hash of the one before."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
+from functools import partial
 from hashlib import sha256
 from typing import Annotated, Any, TypeAlias
 
 from msgspec import Meta, Struct, to_builtins
-from sqlalchemy import Column, Connection, Row, Select, func, select
+from sqlalchemy import Column, Connection, Row, Select, func, insert, select
+from sqlalchemy.dialects import postgresql
 
 from lightpen import __version__
 from lightpen.archive.store import ENTRIES, RECORDS, Database
@@ -27,7 +29,11 @@ from lightpen.formats.own_json import (
 from lightpen.messages import Message, message, printable
 from lightpen.model.names import Origin
 from lightpen.record.folder import TrialOutcome
-from lightpen.record.library.entered_files import NOTHING_BEFORE
+from lightpen.record.library.entered_files import (
+    NOTHING_BEFORE,
+    require_own,
+    require_remembered,
+)
 from lightpen.record.library.signing import (
     STATION_KEY,
     ChainKeys,
@@ -35,7 +41,9 @@ from lightpen.record.library.signing import (
     entry_text,
     key_in,
     known_station_name,
+    remember_head,
     station_key,
+    station_name,
 )
 from lightpen.record.results.results import TipChange
 from lightpen.record.swings.header import Names
@@ -259,9 +267,6 @@ def read_row(database: Database, row: Row[Any]) -> StoredEntry:
     return entry
 
 
-BATCH = 200  # entries that are copied in one transaction
-
-
 def chain_at_home(database: Database) -> str | None:
     """Return the chain of a file, if it has begun; None of a server."""
     if database.file is None:
@@ -298,36 +303,6 @@ def hash_in(connection: Connection, chain: str, number: int) -> str | None:
         ENTRIES.c.chain == chain, ENTRIES.c.number == number
     )
     return connection.execute(wanted).scalar_one_or_none()
-
-
-def entries_of(database: Database, chain: str) -> Iterator[StoredEntry]:
-    """Yield the entries of a chain, in their order."""
-    after = 0
-    while True:
-        batch = batch_of(database, chain, after)
-        yield from batch
-        if len(batch) < BATCH:
-            return
-        after = batch[-1].entry.number
-
-
-def batch_of(database: Database, chain: str, after: int) -> tuple[StoredEntry, ...]:
-    """Return the next few entries of a chain, as `entries_of`."""
-    wanted = (
-        select(*READ)
-        .where(ENTRIES.c.chain == chain, ENTRIES.c.number > after)
-        .order_by(ENTRIES.c.number)
-        .limit(BATCH)
-    )
-    return read_entries(database, wanted)
-
-
-def records_of(database: Database, entries: Sequence[StoredEntry]) -> dict[str, str]:
-    """Return the records that entries refer to, by their hash."""
-    names = [each.entry.event.record_sha256 for each in entries]
-    wanted = select(RECORDS).where(RECORDS.c.sha256.in_([n for n in names if n]))
-    rows = database.rows(wanted)
-    return {row.sha256: row.text for row in rows if isinstance(row.text, str)}
 
 
 def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry | None:
@@ -370,15 +345,6 @@ def head_in(connection: Connection, chain: str) -> ChainHead:
     return ChainHead(chain, row.number, row.sha256, since, key_in(row.signature))
 
 
-def of_limits(chain: str) -> Select[Any]:
-    """Return the query for the entries of limits of a chain, the oldest first."""
-    return (
-        select(*READ)
-        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
-        .order_by(ENTRIES.c.number)
-    )
-
-
 # Signatures of entries: made as they are entered, and verified.
 #
 # An entry is signed over its hash, and so over all entries before it. The signature is
@@ -411,3 +377,84 @@ def signature_finding(keys: ChainKeys, entry: StoredEntry) -> Message | None:
     event, number = entry.entry.event, entry.entry.number
     found = event.kind, event.settings, entry.sha256, entry.signature
     return keys.finding(number, *found)
+
+
+# A chain only grows by entries that follow its last one, signed by its keys.
+
+
+SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
+
+
+def own_chain(database: Database) -> str:
+    """Return the chain of a file; the first call begins it with its station key."""
+    chain = chain_at_home(database)
+    if chain is not None:
+        return chain
+    assert database.file is not None
+    try:
+        return station_name(database.file.parent)
+    except FileError as error:
+        raise ArchiveError(error.message) from error
+
+
+def append(
+    database: Database, chain: str, event: Event, record: str | None = None
+) -> StoredEntry | None:
+    """Append an entry to the chain of a file.
+
+    When this returns, the entry is durable; when it raises or is killed, it is stored
+    whole or not at all. Of two programs that enter the same result file, or that the
+    same swing was abandoned, one does; the other gets None. The event contains the hash
+    of the record, which is JSON.
+    """
+    with database.writing() as connection:
+        if _is_entered(connection, chain, event):
+            return None
+        _require_remembered(connection, chain, database)
+        head = head_in(connection, chain)
+        entry = chained(head, event)
+        signature = entry_signature(head, event, entry.sha256)
+        entry = replace(entry, signature=signature)
+        if record is not None:
+            keep_records(connection, {text_sha256(record): record})
+        put_entries(connection, [entry])
+    remember_head(chain, entry.entry.number, entry.sha256)
+    return entry
+
+
+def _require_remembered(connection: Connection, chain: str, database: Database) -> None:
+    assert database.file is not None
+    try:
+        require_own(database.file.parent, chain)
+        require_remembered(database.name, chain, partial(hash_in, connection, chain))
+    except FileError as error:
+        raise ArchiveError(error.message) from error
+
+
+def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
+    if event.result is not None:
+        same = ENTRIES.c.result == searchable(event.result.place)
+    elif event.kind in SET_ASIDE:
+        kinds = [kind.value for kind in SET_ASIDE]
+        same = (ENTRIES.c.swing == searchable(event.swing)) & ENTRIES.c.kind.in_(kinds)
+    else:
+        return False
+    wanted = select(ENTRIES.c.number).where(ENTRIES.c.chain == chain, same).limit(1)
+    return connection.execute(wanted).one_or_none() is not None
+
+
+def put_entries(connection: Connection, entries: Sequence[StoredEntry]) -> None:
+    """Store entries behind those of their chains."""
+    if entries:
+        connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
+
+
+def keep_records(connection: Connection, records: Mapping[str, str]) -> None:
+    """Keep records that are not there yet."""
+    wanted = select(RECORDS.c.sha256).where(RECORDS.c.sha256.in_(list(records)))
+    known = set(connection.execute(wanted).scalars())
+    new = [{"sha256": n, "text": t} for n, t in records.items() if n not in known]
+    if new:  # on a server, another role may have stored one invisible to this one
+        put = postgresql.insert(RECORDS).on_conflict_do_nothing()
+        is_server = connection.dialect.name == "postgresql"
+        connection.execute(put if is_server else insert(RECORDS), new)

@@ -1,15 +1,11 @@
 """Queries of an archive: entries by filters, the history of tips, what is due."""
 
-import json
-import os
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +27,14 @@ from lightpen.archive.chains import (
     Entry,
     Kind,
     StoredEntry,
-    chain_names,
-    entries_of,
     read_entries,
-    records_of,
     searchable,
     since_us,
     sound_entry,
 )
 from lightpen.archive.store import ENTRIES, Database
-from lightpen.errors import FileError, NameTakenError
 from lightpen.estimation.reports.verdict import AXES
-from lightpen.formats.files import strerror, write_whole
+from lightpen.formats.files import write_whole
 from lightpen.formats.tables import csv_table
 from lightpen.model.limits import DueRule
 from lightpen.model.names import folded_name
@@ -355,68 +347,7 @@ def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[i
     return swings
 
 
-# All entries of an archive in a file.
-#
-# An exported archive is text. Its first line names the format, and each of the others
-# holds one entry with its record, but for the last: it says how many entries there are,
-# and the checksum of all lines before it.
-
-
-FORMAT = 1
-
-
 Report = Callable[[float], None]
-
-
-def export_entries(
-    database: Database, path: Path, report: Report = lambda fraction: None
-) -> int:
-    """Write all entries of an archive to a new file; return their number.
-
-    ``report`` is called with the fraction done, 0 to 1; what it raises ends the work.
-    Only a whole file stays.
-    """
-    n_entries, checksum = 0, sha256()
-    n_all = n_wanted(database, EntryFilter())
-    with ExitStack() as undo:
-        try:
-            with path.open("xb") as stream:
-                undo.callback(path.unlink, missing_ok=True)
-                for content in _contents(database):
-                    line = _entry_line(content)
-                    stream.write(line)
-                    checksum.update(line)
-                    n_entries += "entry" in content
-                    report(min(1.0, n_entries / max(n_all, 1)))
-                end = {"n_entries": n_entries, "sha256": checksum.hexdigest()}
-                stream.write(_entry_line(end))
-                stream.flush()
-                os.fsync(stream.fileno())
-        except FileExistsError as error:
-            raise NameTakenError("archive.export-exists", file=path) from error
-        except OSError as error:
-            raise FileError(
-                "archive.not-exported", file=path, reason=strerror(error)
-            ) from error
-        undo.pop_all()
-    return n_entries
-
-
-def _contents(database: Database) -> Iterator[dict[str, object]]:
-    yield {"lightpen_archive": FORMAT}
-    for chain in chain_names(database):
-        for entry in entries_of(database, chain):
-            name = entry.entry.event.record_sha256
-            records = records_of(database, [entry])
-            yield {
-                "entry": entry.text,
-                "signature": entry.signature,
-                "record": None if name is None else records.get(name),
-            }
-
-
-def _entry_line(content: object) -> bytes:
-    return json.dumps(content).encode() + b"\n"
 
 
 COLUMNS = (

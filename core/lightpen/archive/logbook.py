@@ -16,10 +16,12 @@ from lightpen.archive.chains import (
     Event,
     Kind,
     StoredEntry,
+    append,
     chain_at_home,
     chain_head,
     entry_of_result,
     is_swing_entered,
+    own_chain,
     this_program,
 )
 from lightpen.archive.events import (
@@ -32,7 +34,6 @@ from lightpen.archive.events import (
     event_of_unreadable,
     is_station_file,
 )
-from lightpen.archive.growth import append, own_chain
 from lightpen.archive.history import due_tips
 from lightpen.archive.store import Database, look_into, open_file
 from lightpen.errors import AcceptanceError, ArchiveError, FileError, NoArchiveError

@@ -1,13 +1,12 @@
 """The database of an archive: its tables, opened for reading and writing."""
 
-import socket
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from threading import Condition, Timer
+from threading import Condition
 from time import monotonic, sleep
 from typing import Any
 
@@ -18,7 +17,6 @@ from sqlalchemy import (
     Connection,
     Engine,
     Executable,
-    FetchedValue,
     Index,
     Integer,
     MetaData,
@@ -48,13 +46,6 @@ from lightpen.record.library.entered_files import make_folder
 
 
 METADATA = MetaData()
-
-CHAIN_WRITERS = Table(  # of a server
-    "archive_writers",
-    MetaData(),
-    Column("chain", String(32), primary_key=True),
-    Column("writer", Text, nullable=False, server_default=FetchedValue()),  # its role
-)
 
 ENTRIES = Table(
     "archive_entries",
@@ -145,8 +136,6 @@ LONGEST_FAREWELL_S = 2  # for its users at closing
 MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish writing
 PAUSE_S = 0.02  # between two attempts where SQLite does not retry
-# A proxy may keep a connection open whose other end is gone.
-LONGEST_ANSWER_S = 120.0
 
 _VERSION = Table(
     VERSION_TABLE, MetaData(), Column("version_num", String(32), primary_key=True)
@@ -160,6 +149,8 @@ class Database:
     engine: Engine
     name: str  # file or address without the password, fit to be shown
     file: Path | None = None  # None of a server
+    # Within which a connection is used.
+    watch: Callable[[Connection], AbstractContextManager[object]] = nullcontext
     _uses: UseCount = field(
         default_factory=UseCount, init=False, repr=False, compare=False
     )
@@ -193,10 +184,7 @@ class Database:
     def _used(self, engine: Engine) -> Iterator[Connection]:
         with self._uses.one(), _converting_errors(self.name):
             try:
-                with (
-                    engine.begin() as connection,
-                    nullcontext() if self.file else _given_up_in_time(connection),
-                ):
+                with engine.begin() as connection, self.watch(connection):
                     yield connection
             finally:
                 if self._uses.are_over:  # a late user closes its own connection
@@ -334,27 +322,6 @@ def _with_tables(database: Database) -> Database:
         database.close()
         raise
     return database
-
-
-@contextmanager
-def _given_up_in_time(connection: Connection) -> Iterator[None]:
-    """Close the connection to a server that does not answer in time."""
-    line = connection.connection.dbapi_connection
-    assert line is not None
-    with socket.fromfd(line.fileno(), socket.AF_INET, socket.SOCK_STREAM) as end:
-        watch = Timer(LONGEST_ANSWER_S, _shut_down, (end,))
-        watch.daemon = True
-        watch.start()
-        try:
-            yield
-        finally:
-            watch.cancel()
-            watch.join()
-
-
-def _shut_down(end: socket.socket) -> None:
-    with suppress(OSError):  # it is closed already
-        end.shutdown(socket.SHUT_RDWR)
 
 
 def _found_version(connection: Connection) -> str | None:

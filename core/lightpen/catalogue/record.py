@@ -104,8 +104,6 @@ MESSAGES = {
     "archive.missing": "The archive {file} does not exist or is empty. Check the data folder.",
     "archive.entry": "entry {number} of chain {chain}",
     "archive.entry-of-station": "entry {number} of the station {station}",
-    "archive.export-exists": "The file {file} exists already. Give the export another name.",
-    "archive.not-exported": "Archive export to {file} failed: {reason}. Free some space, or choose another folder.",
     "archive.vouched-changed": "The file {file} of entry {number} was modified after it was entered.",
     "archive.vouched-missing": "The file {file} of entry {number} is missing.",
     "archive.swing-missing": "The swing {folder} of entry {number} is missing.",

@@ -1,4 +1,4 @@
-"""``lightpen archive``: check, list, deliver, fetch and export entries."""
+"""``lightpen archive``: check, list, deliver and fetch entries."""
 
 import argparse
 from collections.abc import Sequence
@@ -29,7 +29,6 @@ def add_archive(
         "check", help="check every entry, record, result and image"
     )
     listed = actions.add_parser("list", help="print the newest entries")
-    export = actions.add_parser("export", help="export all entries to a file")
     check.set_defaults(check_copy=None)
     for each in extensions:
         if each.add_archive_actions is not None:
@@ -46,7 +45,6 @@ def add_archive(
     for name, action in actions.choices.items():
         if name != "server-sql":
             add_data(action, data_folder)
-    export.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
     for name in ("pen", "tip", "station"):
         listed.add_argument(
             f"--{name}", default="", help="list entries of this item only"

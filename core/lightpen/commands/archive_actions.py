@@ -7,14 +7,7 @@ from pathlib import Path
 
 from lightpen.archive.chains import SHORT
 from lightpen.archive.checks import check_file
-from lightpen.archive.history import (
-    EntryFilter,
-    Line,
-    entries_csv,
-    export_entries,
-    lines,
-    newest,
-)
+from lightpen.archive.history import EntryFilter, Line, entries_csv, lines, newest
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import Database, look_into
 from lightpen.commands.arguments import data_of, supervisor_signature
@@ -65,13 +58,6 @@ def _list(options: argparse.Namespace) -> None:
 
 
 @printing
-def _export(options: argparse.Namespace) -> None:
-    with _looked_into(data_of(options)) as database:
-        n_entries = export_entries(database, options.file)
-    print(shown(f"{n_entries} entries are in {options.file}."))
-
-
-@printing
 def _new_key(options: argparse.Namespace) -> None:
     data = data_of(options)
     with closing(Logbook(data)) as logbook:
@@ -82,12 +68,7 @@ def _new_key(options: argparse.Namespace) -> None:
     print(f"The station key is {public} from now on.")
 
 
-ACTIONS: dict[str, Command] = {
-    "check": _check,
-    "list": _list,
-    "export": _export,
-    "new-key": _new_key,
-}
+ACTIONS: dict[str, Command] = {"check": _check, "list": _list, "new-key": _new_key}
 
 
 @contextmanager

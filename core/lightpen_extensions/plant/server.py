@@ -18,18 +18,13 @@ from sqlalchemy.schema import CreateIndex, CreateTable
 from lightpen.archive.chains import (
     SHORT,
     StoredEntry,
-    batch_of,
     chain_at_home,
     chain_head,
     chain_names,
-    entries_of,
     hash_in,
-    records_of,
 )
 from lightpen.archive.checks import check_archive
-from lightpen.archive.growth import copy_entries
 from lightpen.archive.store import (
-    CHAIN_WRITERS,
     ENTRIES,
     RECORDS,
     VERSION,
@@ -41,7 +36,16 @@ from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.formats.files import create_whole
 from lightpen.formats.machine_settings import machine_settings
 from lightpen.messages import Message, message, printable
-from lightpen.record.library.entered_files import make_folder, reserve_number
+from lightpen.record.library.entered_files import make_folder
+from lightpen_extensions.plant.copies import (
+    CHAIN_WRITERS,
+    batch_of,
+    copy_entries,
+    entries_of,
+    given_up_in_time,
+    records_of,
+    reserve_number,
+)
 
 TLS = "verify-full"  # as libpq has it: encrypted, by a certificate for this name
 _CALLING: Mapping[str, Any] = {
@@ -75,7 +79,7 @@ def open_server(address: str) -> Database:
         event.listen(engine, "connect", _ask_to_notice)
     except ModuleNotFoundError as error:
         raise ArchiveError("archive.no-driver") from error
-    database = Database(engine, _without_password(url))
+    database = Database(engine, _without_password(url), watch=given_up_in_time)
     if known_version(database) is None:
         database.close()
         raise ArchiveError("archive.server-empty", name=database.name)

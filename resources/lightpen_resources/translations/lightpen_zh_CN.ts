@@ -45,14 +45,6 @@
         <translation>检查档案库</translation>
     </message>
     <message>
-        <source>Save...</source>
-        <translation>保存...</translation>
-    </message>
-    <message>
-        <source>Listed entries (CSV)...</source>
-        <translation>所列条目 (CSV)...</translation>
-    </message>
-    <message>
         <source>Another operation is in progress.</source>
         <translation>另一项操作正在进行。</translation>
     </message>
@@ -61,8 +53,8 @@
         <translation>读取并核对每个条目、记录、结果和图像</translation>
     </message>
     <message>
-        <source>All entries (JSON lines)...</source>
-        <translation>所有条目 (JSON 行)...</translation>
+        <source>Save listed entries (CSV)...</source>
+        <translation>保存所列条目(CSV)...</translation>
     </message>
     <message>
         <source>For other programs</source>
@@ -6944,10 +6936,6 @@ needed</source>
         <translation>另一验证尚未完成。请先完成它或重新开始，然后继续中断的验证。</translation>
     </message>
     <message>
-        <source>Archive export to {file} failed: {reason}. Free some space, or choose another folder.</source>
-        <translation>无法将档案库导出到 {file}：{reason}。请释放一些空间，或选择其他文件夹。</translation>
-    </message>
-    <message>
         <source>Ball diameter {diameter:g} mm is not valid; the range is above 0 to {most:g} mm. Enter the measured diameter, or leave it empty.</source>
         <translation>测球直径 {diameter:g} mm 无效；范围为大于 0 至 {most:g} mm。请输入测得的直径，或留空。</translation>
     </message>
@@ -7590,10 +7578,6 @@ needed</source>
     <message>
         <source>The feature {name} has {n_touches} probed points; the plan needs {needed}. Probe the missing points.</source>
         <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请触测缺少的点。</translation>
-    </message>
-    <message>
-        <source>The file {file} exists already. Give the export another name.</source>
-        <translation>文件 {file} 已存在。请为导出另取名称。</translation>
     </message>
     <message>
         <source>The file {file} has no entry in the archive yet. Start the program to enter it.</source>

@@ -12,8 +12,14 @@ from threading import Thread
 import pytest
 from benchmarks.postgres_server import Postgres, postgres_programs
 
-from lightpen.archive.chains import Event, Kind, StoredEntry, text_sha256
-from lightpen.archive.growth import append, own_chain
+from lightpen.archive.chains import (
+    Event,
+    Kind,
+    StoredEntry,
+    append,
+    own_chain,
+    text_sha256,
+)
 from lightpen.archive.store import Database, open_file
 from lightpen.record.swings.header import Names
 

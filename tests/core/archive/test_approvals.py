@@ -11,15 +11,7 @@ from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from tests.core.archive.test_logbook import checked, result
 
-from lightpen.archive.chains import (
-    ChainHead,
-    Kind,
-    StoredEntry,
-    chained,
-    entries_of,
-    records_of,
-)
-from lightpen.archive.growth import copy_entries
+from lightpen.archive.chains import ChainHead, Kind, StoredEntry, chained
 from lightpen.archive.history import messages_on
 from lightpen.archive.logbook import Logbook
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
@@ -37,6 +29,7 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
+from lightpen_extensions.plant.copies import copy_entries, entries_of, records_of
 from lightpen_extensions.plant.server import open_server
 
 

@@ -10,11 +10,18 @@ from pathlib import Path
 from msgspec import structs
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains import FileHash, Kind, chain_head, chain_names, entries_of
-from lightpen.archive.growth import append, own_chain
+from lightpen.archive.chains import (
+    FileHash,
+    Kind,
+    append,
+    chain_head,
+    chain_names,
+    own_chain,
+)
 from lightpen.archive.history import EntryFilter, last_accepted, n_wanted, newest
 from lightpen.archive.store import open_file
 from lightpen.record.library.entered_files import NOTHING_BEFORE
+from lightpen_extensions.plant.copies import entries_of
 
 N_EACH = 20
 

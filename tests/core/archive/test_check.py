@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains import chain_names, entries_of, records_of
+from lightpen.archive.chains import chain_names
 from lightpen.archive.checks import check_archive, check_file
 from lightpen.archive.store import look_into
 from lightpen.errors import ArchiveError
+from lightpen_extensions.plant.copies import entries_of, records_of
 
 N_FLIPS = 60
 

@@ -1,11 +1,9 @@
 """Entries are delivered and exported."""
 
-import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -14,60 +12,13 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains import FileHash, chain_names, entries_of, records_of
+from lightpen.archive.chains import FileHash, append, chain_names, own_chain
 from lightpen.archive.checks import check_file
-from lightpen.archive.growth import append, copy_entries, own_chain
-from lightpen.archive.history import export_entries
 from lightpen.archive.store import Database, open_file
-from lightpen.errors import ArchiveError, NameTakenError
+from lightpen.errors import ArchiveError
 from lightpen.record.library.entered_files import ARCHIVE
+from lightpen_extensions.plant.copies import copy_entries, entries_of, records_of
 from lightpen_extensions.plant.server import deliver, open_server
-
-
-def test_an_export_has_every_entry_with_its_record(
-    station: Station, tmp_path: Path
-) -> None:
-    entries = station.enter(3)
-    file = tmp_path / "all.jsonl"
-
-    assert export_entries(station.database, file) == 3
-    content = file.read_bytes()
-    first, *lines, last = map(json.loads, content.splitlines())
-    records = records_of(station.database, entries)
-    assert first == {"lightpen_archive": 1}
-    assert lines == [
-        {
-            "entry": each.text,
-            "signature": each.signature,
-            "record": records[each.entry.event.record_sha256 or ""],
-        }
-        for each in entries
-    ]
-    body = content[: content.rindex(b'{"n_entries"')]
-    assert last == {"n_entries": 3, "sha256": sha256(body).hexdigest()}
-
-
-def test_an_export_is_on_the_disk_whole(
-    station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    station.enter(3)
-    lengths: list[int] = []
-    monkeypatch.setattr(
-        "os.fsync", lambda descriptor: lengths.append(os.fstat(descriptor).st_size)
-    )
-
-    export_entries(station.database, tmp_path / "all.jsonl")
-
-    assert lengths == [(tmp_path / "all.jsonl").stat().st_size]
-
-
-def test_an_export_replaces_no_file(station: Station, tmp_path: Path) -> None:
-    file = tmp_path / "all.jsonl"
-    file.write_text("mine")
-
-    with pytest.raises(NameTakenError, match="Give the export another name"):
-        export_entries(station.database, file)
-    assert file.read_text() == "mine"
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON, Station
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains import entries_of
 from lightpen.archive.checks import check_file
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import Database, open_file
@@ -22,6 +21,7 @@ from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.library.tip_library import ListedCone, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.plant.server import FetchResult, deliver, fetch, open_server
 
 

@@ -10,8 +10,7 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains import Event, Kind, StoredEntry
-from lightpen.archive.growth import append
+from lightpen.archive.chains import Event, Kind, StoredEntry, append
 from lightpen.archive.history import (
     COLUMNS,
     EntryFilter,

@@ -9,9 +9,8 @@ import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
 from tests.entering import retire_item
 
-from lightpen.archive.chains import Entry, Kind, entries_of
+from lightpen.archive.chains import Entry, Kind, append
 from lightpen.archive.checks import check_archive
-from lightpen.archive.growth import append
 from lightpen.archive.history import due_tips, known_names
 from lightpen.archive.logbook import Logbook, folder_statuses, statuses
 from lightpen.archive.store import look_into
@@ -28,6 +27,7 @@ from lightpen.record.library.tip_library import (
     TipStatus,
     library_files,
 )
+from lightpen_extensions.plant.copies import entries_of
 
 ANN = Author("Hall 2", "Ann", "bought in May")
 RULE = DueRule(30, 0)

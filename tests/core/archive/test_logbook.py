@@ -13,7 +13,7 @@ from benchmarks.small_records import small_record
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains import Entry, Kind, entries_of, records_of
+from lightpen.archive.chains import Entry, Kind
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import look_into
@@ -27,6 +27,7 @@ from lightpen.record.results.results import Result
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import discard_damaged, discard_swing
 from lightpen.record.swings.reading import open_record
+from lightpen_extensions.plant.copies import entries_of, records_of
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 

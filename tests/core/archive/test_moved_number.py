@@ -8,10 +8,9 @@ import pytest
 from sqlalchemy import text
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains import entries_of
 from lightpen.archive.checks import check_archive
-from lightpen.archive.history import export_entries
 from lightpen.errors import ArchiveError
+from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.plant.server import deliver, fetch
 
 MOVE = text(
@@ -41,8 +40,6 @@ def test_a_check_names_the_entry_and_ends(moved: Station, tmp_path: Path) -> Non
 def test_entries_are_read_up_to_it(moved: Station, tmp_path: Path) -> None:
     with pytest.raises(ArchiveError, match="Entry 4"):
         list(entries_of(moved.database, moved.chain))
-    with pytest.raises(ArchiveError, match="Entry 4"):
-        export_entries(moved.database, tmp_path / "all.jsonl")
 
 
 @pytest.mark.timeout(60)

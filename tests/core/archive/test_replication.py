@@ -9,10 +9,10 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains import entries_of
 from lightpen.archive.checks import check_archive
 from lightpen.archive.history import EntryFilter, last_accepted, newest
 from lightpen_extensions.plant import server as replication
+from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.plant.server import Replicator, deliver, open_server
 
 PATIENCE_S = 60.0

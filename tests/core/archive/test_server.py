@@ -9,9 +9,10 @@ import pytest
 from benchmarks.postgres_server import PASSWORD, Postgres
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains import chain_names, entries_of, records_of
+from lightpen.archive.chains import chain_names
 from lightpen.archive.checks import check_archive
 from lightpen.errors import ArchiveError
+from lightpen_extensions.plant.copies import entries_of, records_of
 from lightpen_extensions.plant.server import deliver, open_server
 
 

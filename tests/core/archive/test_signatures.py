@@ -8,18 +8,12 @@ from benchmarks.postgres_server import Postgres
 from sqlalchemy import update
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains import (
-    ChainHead,
-    StoredEntry,
-    chained,
-    entries_of,
-    records_of,
-)
+from lightpen.archive.chains import ChainHead, StoredEntry, chained
 from lightpen.archive.checks import check_archive
-from lightpen.archive.growth import copy_entries
 from lightpen.archive.store import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing import key_folder, make_station_key
+from lightpen_extensions.plant.copies import copy_entries, entries_of, records_of
 from lightpen_extensions.plant.server import open_server
 
 

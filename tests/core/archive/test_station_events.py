@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains import Event, Kind, entries_of, records_of
+from lightpen.archive.chains import Event, Kind
 from lightpen.archive.checks import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.store import look_into
@@ -41,6 +41,7 @@ from lightpen_extensions.comparisons.assessment import (
     VerificationAssessment,
     verification_record,
 )
+from lightpen_extensions.plant.copies import entries_of, records_of
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")

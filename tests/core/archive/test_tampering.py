@@ -22,7 +22,6 @@ from lightpen.archive.chains import (
     chain_names,
     chained,
     columns_of,
-    entries_of,
 )
 from lightpen.archive.checks import check_file
 from lightpen.archive.logbook import Logbook
@@ -34,6 +33,7 @@ from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.library.tip_library import ListedCone
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.plant.server import check_server, deliver, fetch, open_server
 
 N_RESULTS, N_ENTRIES = 3, 6  # with a cone, a password and limits

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.core.conftest import TIMEOUT, Station
 
-from lightpen.archive.chains import Event, Kind, chain_names, entries_of
+from lightpen.archive.chains import Event, Kind, chain_names
 from lightpen.archive.checks import check_archive
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook import Logbook
@@ -16,6 +16,7 @@ from lightpen.archive.store import look_into
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner
+from lightpen_extensions.plant.copies import entries_of
 
 
 @pytest.fixture

@@ -2,16 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
-from enum import Enum, auto
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
-from lightpen.archive.history import DueTip, export_entries, save_entries
+from lightpen.archive.history import DueTip, save_entries
 from lightpen.archive.logbook import ReplicationState
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
@@ -30,24 +28,12 @@ from lightpen_app.work.workbench import Workbench
 MOST_SHOWN = 100  # findings; the rest is counted
 
 
-class SaveFormat(Enum):
-    """Format to save."""
-
-    TABLE = auto()
-    WHOLE = auto()
-
-    @property
-    def suffix(self) -> str:
-        """Of the file."""
-        return {SaveFormat.TABLE: ".csv", SaveFormat.WHOLE: ".jsonl"}[self]
-
-
 class ArchivePanel(Translated, QWidget):
     """Buttons of the archive, the last check, and the replication."""
 
     check_requested = Signal()
     cancel_requested = Signal()
-    save_requested = Signal(object)  # Saving
+    save_requested = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -58,14 +44,9 @@ class ArchivePanel(Translated, QWidget):
         self._check = self.make_button(
             self.tr("Check the archive"), self.check_requested
         )
-        self._save = self.make_button(self.tr("Save..."))
-        self._save.setProperty("menu", True)
-        menu = QMenu(self._save)
-        texts = (
-            self.tr("Listed entries (CSV)..."),
-            self.tr("All entries (JSON lines)..."),
+        self._save = self.make_button(
+            self.tr("Save listed entries (CSV)..."), self.save_requested
         )
-        self._save.setMenu(menu)
         self.progress = JobProgress()
         self._delivered = SignLabel()
         self._outcome = SignLabel()
@@ -78,11 +59,6 @@ class ArchivePanel(Translated, QWidget):
 
         # Connections
         self.progress.cancelled.connect(self.cancel_requested)
-        for saving, text in zip(SaveFormat, texts, strict=True):
-            self.say(menu.addAction(""), text).triggered.connect(
-                lambda _=False, saving=saving: self.save_requested.emit(saving)
-            )
-
         self._retranslate()
 
     def set_working(self, working: bool) -> None:
@@ -279,21 +255,16 @@ class ArchiveControl(QObject):
         if self._work is not None:
             self._work.cancel()
 
-    def _ask_save(self, saving: SaveFormat) -> None:
-        name = f"lightpen-{self._clock():%Y-%m-%d}{saving.suffix}"
-        path = self._place.folder() / name
-        title = self.tr("Save entries")
-        ask_file(self._panel, title, path, partial(self._save, saving))
+    def _ask_save(self) -> None:
+        path = self._place.folder() / f"lightpen-{self._clock():%Y-%m-%d}.csv"
+        ask_file(self._panel, self.tr("Save entries"), path, self._save)
 
-    def _save(self, saving: SaveFormat, path: Path) -> None:
+    def _save(self, path: Path) -> None:
         logbook, wanted = self._logbook, self._filter.value()
         self._place.remember(path.parent)
 
         def save(report: Report) -> int:
-            database = logbook.opened().database
-            if saving is SaveFormat.WHOLE:
-                return export_entries(database, path, report)
-            return save_entries(database, wanted, path, report)
+            return save_entries(logbook.opened().database, wanted, path, report)
 
         text = self.tr("{0} entries saved in {1}")
         self._do(

@@ -8,7 +8,7 @@ the note in the user account. All others are not entered: they are passed over.
 
 import sqlite3
 from collections.abc import Callable, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, field
 from hashlib import sha256
 from itertools import count
@@ -84,13 +84,6 @@ def numbered_files(folder: Path) -> list[Path]:
     """Return the files, the newest first; others are left alone."""
     files = [p for p in _paths_in(folder) if p.suffix == ".json" and number_of(p)]
     return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
-
-
-def reserve_number(lost: Path) -> None:
-    """Reserve the number of a lost file."""
-    make_folder(lost.parent)
-    with suppress(NameTakenError):
-        create_whole(lost.with_suffix(MISSING), b"")
 
 
 def _paths_in(folder: Path) -> list[Path]:

@@ -28,9 +28,8 @@ from pytestqt.qtbot import QtBot
 from tests.app.room import scrolled_sideways
 from typing_extensions import override
 
-from lightpen.archive.chains import Event, Kind
+from lightpen.archive.chains import Event, Kind, append
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
-from lightpen.archive.growth import append
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.store import Database
 from lightpen.estimation.reports.verdict import Grade
@@ -727,21 +726,15 @@ def test_entries_are_saved(desk: Desk, tmp_path: Path) -> None:
     desk.enter(2)
     desk.open()
     desk.show_tab(WHOLE)
-    desk.click("Listed entries (CSV)...")
+    desk.click("Save listed entries (CSV)...")
     desk.choose_file(tmp_path / "shown.csv")
     desk.until(lambda: "2 entries saved" in desk.statuses[-1])
     assert len((tmp_path / "shown.csv").read_text("utf-8").splitlines()) == 3
-
-    desk.wait_idle()
-    desk.click("All entries (JSON lines)...")
-    desk.choose_file(tmp_path / "hall-2.jsonl")
-    desk.until(lambda: "hall-2.jsonl" in desk.statuses[-1])
     assert desk.notices == []
 
 
-@pytest.mark.parametrize("kind", ["Listed entries (CSV)", "All entries (JSON lines)"])
 def test_saving_that_is_cancelled_leaves_no_file(
-    desk: Desk, tmp_path: Path, hold_back: "HoldBack", kind: str
+    desk: Desk, tmp_path: Path, hold_back: "HoldBack"
 ) -> None:
     desk.enter(3)
     desk.open()
@@ -749,12 +742,9 @@ def test_saving_that_is_cancelled_leaves_no_file(
     folder = tmp_path / "saved"
     folder.mkdir()
     panel, n_said = desk.child(ArchivePanel), len(desk.statuses)
-    # Amid the entries of the one, before those of the other.
-    may_go_on = hold_back(
-        "lightpen.archive.history._entry_line", "lightpen.archive.history.newest"
-    )
+    may_go_on = hold_back("lightpen.archive.history.newest")
 
-    desk.click(f"{kind}...")
+    desk.click("Save listed entries (CSV)...")
     desk.choose_file(folder / "entries")
     desk.until(may_go_on.is_reached.is_set)
     desk.click("Cancel")

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.archive.chains import Event, Kind, StoredEntry
-from lightpen.archive.growth import append, own_chain
+from lightpen.archive.chains import Event, Kind, StoredEntry, append, own_chain
 from lightpen.archive.history import EntryFilter
 from lightpen.archive.store import Database, open_file
 from lightpen.archive.trends import trend_of
