@@ -1,6 +1,8 @@
 """Messages of extensions: code, then template with named values."""
 
 MESSAGES = {
+    "use.scale": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured.",
+    "use.temperature-assumed": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured, as temperature or thermal expansion of the pen are not stated. State both.",
     "discover.no-start": "No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.",
     "discover.no-fit": "No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, that camera and cone stand still, and that zoom and focus are locked.",
     "discover.camera-changed": "The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.",

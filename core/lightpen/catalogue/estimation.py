@@ -73,8 +73,6 @@ MESSAGES = {
     "share.diameter": "the diameter of the LED discs. State it and its uncertainty in the LED file",
     "share.camera": "the intrinsics file. Calibrate the camera, and state the covariance in its file",
     "share.lens": "the lens, beyond its distortion model, and the systematic error of the LED centres. Calibrate the camera with views that fill the image, so that its file states the lens field, focus the lens, and illuminate the LEDs evenly",
-    "use.scale": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured.",
-    "use.temperature-assumed": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured, as temperature or thermal expansion of the pen are not stated. State both.",
     "share.rig": "the extrinsics of the cameras. Calibrate the rig, and state the uncertainty",
     "next-step.accept": "Next: accept the tip.",
     "next-step.capture-more": "Next: capture more images. The images of this swing are retained.",

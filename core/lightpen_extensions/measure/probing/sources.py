@@ -15,13 +15,7 @@ from lightpen.detection.rig_observations import observe_rig_images, see_together
 from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.calibration_record import InstrumentRecord
-from lightpen.estimation.uncertainty.instrument import (
-    Instrument,
-    PenScale,
-    in_use,
-    instrument_of_files,
-    with_rig,
-)
+from lightpen.estimation.uncertainty.instrument import Instrument, PenScale
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.images import ImageSource, find_images
@@ -44,6 +38,11 @@ from lightpen.record.swings.reading import (
     open_record,
 )
 from lightpen.record.swings.solving import RecordSource, is_simulated_recording, source
+from lightpen_extensions.measure.probing.instruments import (
+    in_use,
+    instrument_of_files,
+    with_rig,
+)
 from lightpen_extensions.measure.probing.probing import (
     ProbingRules,
     take_all,

@@ -10,9 +10,10 @@ from tests.accepted_tip import accept_tip
 from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.rigid import rig_of, rotations_of
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.measure.probing.instruments import instrument_of_files
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
     ProbingFrame,

@@ -9,13 +9,12 @@ from tests.accepted_tip import seen_by
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.rig_observations import fit_rig_poses
-from lightpen.estimation.uncertainty.instrument import (
-    Instrument,
+from lightpen.estimation.uncertainty.instrument import Instrument, parameters_of
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
+from lightpen_extensions.measure.probing.instruments import (
     instrument_of_files,
-    parameters_of,
     with_rig,
 )
-from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbedPoint,

@@ -20,12 +20,13 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import StreamError
-from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.own_json import record_bytes
 from lightpen.model.names import Origin
 from lightpen.model.rigid import rig_of
 from lightpen.record.calibrations import read_calibration
 from lightpen.record.swings.header import Names
+from lightpen_extensions.measure.probing.instruments import instrument_of_files
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     StillFrames,

@@ -12,8 +12,9 @@ from tests.accepted_tip import Hold, Holder
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
+from lightpen_extensions.measure.probing.instruments import instrument_of_files
 from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
 from lightpen_extensions.measure.probing.sources import (
     ImageLocation,

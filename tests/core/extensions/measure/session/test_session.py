@@ -12,9 +12,10 @@ from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.measure.measuring.plan import Plan, artefact_plan
+from lightpen_extensions.measure.probing.instruments import instrument_of_files
 from lightpen_extensions.measure.probing.probing import ProbingState, advance_touch
 from lightpen_extensions.measure.probing_operator import ProbingOperator
 from lightpen_extensions.measure.session import (

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.instrument import (
-    Instrument,
-    in_use,
-    instrument_of_files,
-)
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.bending import ASSUMED, Bending, measured_on
 from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rigid import rig_of, rotations_of
+from lightpen_extensions.measure.probing.instruments import in_use, instrument_of_files
 from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbedPoint,
