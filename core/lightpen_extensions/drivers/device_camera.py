@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from lightpen.cameras.pairing import Clock, MachineClock
-from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
+from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,
@@ -36,6 +36,7 @@ from lightpen_extensions.drivers.features import (
     read_settings,
     set_nearest,
 )
+from lightpen_extensions.drivers.pixels import Bytes, decoded
 
 SETTLING = 0.4  # s in which images with the previous exposure may arrive
 LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again

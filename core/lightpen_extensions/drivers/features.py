@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from typing import Protocol
 
-from lightpen.cameras.pixel_formats import usable
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
@@ -13,6 +12,7 @@ from lightpen.cameras.protocol import (
     RegionLimits,
     TriggerMode,
 )
+from lightpen_extensions.drivers.pixels import usable
 
 EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainAbs", "GainRaw")  # the last one in steps of the camera's own

@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import IntArray
-from lightpen.cameras.pixel_formats import (
-    PixelFormat,
-    decoded,
-    pixel_format_named,
-    usable,
-)
+from lightpen.cameras.pixel_formats import PixelFormat, pixel_format_named
+from lightpen_extensions.drivers.pixels import decoded, usable
 
 RNG = np.random.default_rng(3)
 WIDTH, HEIGHT = 7, 5  # neither fills a group of packed pixels
