@@ -11,6 +11,7 @@ from benchmarks.hard_scene import rendered
 from benchmarks.rows import Row, numbers
 from benchmarks.tips import UM
 from benchmarks.workers import Workers
+from tests.simulated_disturbances import plan_disturbed
 from tests.simulated_stations import (
     EXACT,
     Station,
@@ -34,7 +35,7 @@ from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import find_spots
 from lightpen_extensions.simulator.image_plans import plan_scene
-from lightpen_extensions.simulator.scenes import CLEAN, HARD, LEDS, Scene
+from lightpen_extensions.simulator.scenes import LEDS, Scene
 
 N_STATIONS = 120  # give the coverage to 2 %
 N_AGAIN = 60  # of them, whose files calibrate the tip again
@@ -239,12 +240,12 @@ def rendered_error(looks_and_seed: tuple[str, int]) -> tuple[float, float]:
         swing="operator",
         faces=leds.faces,
         optics=leds.optics,
-        disturbances=HARD if looks == "hard" else CLEAN,
     )
+    plan = plan_disturbed(scene) if looks == "hard" else plan_scene(scene)
     pen = scene.pen
     longest = float(np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2).max())
     request = Request((MeasuredLength(None, longest, EXACT),), pen.diameter)
-    found = discover(find_spots(rendered(plan_scene(scene))), request)
+    found = discover(find_spots(rendered(plan)), request)
     order = numbers_of(found.pen.leds, pen.leds)
     R, t = fit_rigid(pen.leds, found.pen.leds[order])
     off = found.tip_pen - (R @ scene.tip_pen + t)

@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.tips import UM
 from benchmarks.workers import Workers
+from tests.simulated_disturbances import flags_of, plan_disturbed
 
 from lightpen.arrays import BoolArray, Image
 from lightpen.detection.observations import observe_images
@@ -16,9 +17,9 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images
-from lightpen_extensions.simulator.image_plans import ScenePlan, plan_scene, render_plan
+from lightpen_extensions.simulator.image_plans import ScenePlan, render_plan
 from lightpen_extensions.simulator.scene_files import scene_truth
-from lightpen_extensions.simulator.scenes import HARD, Scene
+from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import leds_in_camera
 
 SEEDS = (101, 102, 103)
@@ -85,8 +86,8 @@ def hard_scene_rows(workers: Workers) -> list[Row]:
 
 
 def _outcome(seed: int) -> _Outcome:
-    scene = Scene(n_images=N_IMAGES, seed=seed, disturbances=HARD)
-    plan = plan_scene(scene)
+    scene = Scene(n_images=N_IMAGES, seed=seed)
+    plan = plan_disturbed(scene)
     pen = plan.measured_pen
     seen = observe_images(rendered(plan), scene.camera, pen, n_threads=1)
     calibration = calibrate(scene.camera, pen, seen)
@@ -125,7 +126,7 @@ def rendered(plan: ScenePlan) -> ImageSource:
 
 
 def _flags(plan: ScenePlan) -> list[tuple[str, ...]]:
-    return [image_plan.flags for image_plan in plan.image_plans]
+    return [flags_of(image_plan) for image_plan in plan.image_plans]
 
 
 def _spoilt(flags: tuple[str, ...]) -> str:

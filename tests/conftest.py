@@ -349,16 +349,33 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
 def scene(
     lightpen: Callable[..., CompletedProcess[str]], once: MakeOnce
 ) -> Callable[..., Path]:
-    """Return a function that simulates a set with `options`, each set once."""
+    """Return a function that simulates a set with `options`, each set once.
+
+    After ``hard`` they are the number of images, the seed, binning and pen.
+    """
 
     def simulated(*options: str) -> Path:
         def simulate(folder: Path) -> None:
+            if options[0] == "hard":
+                _write_hard(folder / "set", *options[1:])
+                return
             outcome = lightpen("simulate", folder / "set", *options)
             assert outcome.returncode == 0, outcome.stderr
 
         return once(f"scene {options}", simulate) / "set"
 
     return simulated
+
+
+def _write_hard(folder: Path, n_images: str, seed: str, binning: str, pen: str) -> None:
+    from tests.simulated_disturbances import write_disturbed
+
+    from lightpen_extensions.simulator.scenes import SAMPLE_PENS, Scene
+    from lightpen_extensions.simulator.swings import paper_camera
+
+    camera = paper_camera(int(binning))
+    scene = Scene(int(n_images), int(seed), pen=SAMPLE_PENS[pen](), camera=camera)
+    write_disturbed(scene, folder)
 
 
 @pytest.fixture(scope="session")

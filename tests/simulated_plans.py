@@ -1,11 +1,12 @@
 """Images of an operator's endless swing, at any time, and of a pen at rest."""
 
 import numpy as np
+from tests.simulated_disturbances import plan_in_motion
 
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import vector_from_rotation
-from lightpen_extensions.simulator.image_plans import ImagePlan, plan_in_motion
+from lightpen_extensions.simulator.image_plans import ImagePlan
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import operator_postures
 from lightpen_extensions.simulator.view import View
@@ -19,7 +20,7 @@ def live_plan(
     Parameters
     ----------
     scene : Scene
-        Its disturbances are left out.
+        Pen, camera and all else.
     index : int
         Number of the image, which chooses its noise.
     time : float

@@ -34,12 +34,6 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         help="seed of the random numbers (0)",
     )
     parser.add_argument(
-        "--scene",
-        choices=("clean", "hard"),
-        default="clean",
-        help="disturbance to simulate",
-    )
-    parser.add_argument(
         "--swing",
         choices=("field", "cone", "operator", "one-axis", "upright"),
         default="field",
@@ -114,7 +108,6 @@ def _simulate(options: argparse.Namespace) -> None:
     from lightpen_extensions.simulator.scenes import (
         LEDS,
         SAMPLE_PENS,
-        SCENES,
         Scene,
         Sensor,
         row_of_cameras,
@@ -127,7 +120,6 @@ def _simulate(options: argparse.Namespace) -> None:
         n_images=options.images,
         seed=options.seed,
         swing=options.swing,
-        disturbances=SCENES[options.scene],
         sensor=Sensor(bits=options.bits),
         faces=looks.faces,
         optics=replace(looks.optics, psf_sigma=options.blur),

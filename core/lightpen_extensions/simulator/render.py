@@ -1,13 +1,10 @@
-"""Irradiance on the sensor by LEDs, lamps, reflections and fingers."""
+"""Irradiance on the sensor by LEDs, lamps and other lights."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
@@ -24,34 +21,16 @@ from lightpen_extensions.simulator.swings import faces_camera, leds_in_camera
 from lightpen_extensions.simulator.view import (
     BOARD_OFFSET,
     GHOST_OFFSET,
-    Finger,
-    Glare,
     Lamp,
     Optics,
     View,
+    Window,
 )
 
-OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
-HIDDEN_SAMPLES = 8  # per pixel and axis
-POLYGON_SAMPLES = 4
 DEFOCUS_SAMPLES = 9  # per pixel and axis, of the defocus kernel
 HALO_SIGMA = 15.0  # px
 BOARD_SIGMA = 2.0  # px
 HALO_REACH = 3.0  # standard deviations; zero beyond
-
-
-class Window(NamedTuple):
-    """Rows ``top`` to ``bottom`` and columns ``left`` to ``right`` of an image."""
-
-    top: int
-    bottom: int
-    left: int
-    right: int
-
-    @property
-    def slices(self) -> tuple[slice, slice]:
-        """Index of the window into an image."""
-        return slice(self.top, self.bottom), slice(self.left, self.right)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +49,8 @@ def render_view(camera: Camera, pen: Pen, view: View, optics: Optics) -> Light:
     windows = _add_patches(levels, _led_patches(camera, pen, view, optics))
     for lamp in view.lamps:
         windows += _add_patches(levels, _lamp_patches(lamp, optics))
-    for glare in view.glares:
-        windows += _add_glare(levels, glare, optics.exposure)
-    for finger in view.fingers:
-        _darken(levels, finger)
+    for other in view.others:
+        windows += other.draw(levels, optics.exposure)
     across, down = optics.gradient
     return Light(
         levels,
@@ -95,25 +72,6 @@ def led_levels(
     peak = optics.peak * optics.exposure
     levels = peak * np.maximum(cosines, 0) ** optics.cos_power
     return np.where(faces_camera(leds_cam, normals_cam), levels, 0.0)
-
-
-def hidden_fraction(
-    camera: Camera, outline: FloatArray, fingers: Sequence[Finger]
-) -> float:
-    """Return the fraction of the area of an outline (N, 2), px, that is hidden.
-
-    Fingers or the border hide it. To about 0.002 for discs of 40 px.
-    """
-    top_left = np.floor(outline.min(axis=0)).astype(int) - 1
-    right, bottom = np.ceil(outline.max(axis=0)).astype(int) + 2
-    window = Window(int(top_left[1]), int(bottom), int(top_left[0]), int(right))
-    width, height = camera.width - 0.5, camera.height - 0.5
-    sensor = np.array([[-0.5, -0.5], [width, -0.5], [width, height], [-0.5, height]])
-    whole = _fine_polygon(window, outline, HIDDEN_SAMPLES)
-    shown = whole & _fine_polygon(window, sensor, HIDDEN_SAMPLES)
-    for finger in fingers:
-        shown &= ~_fine_polygon(window, finger.outline, HIDDEN_SAMPLES)
-    return 1 - np.count_nonzero(shown) / np.count_nonzero(whole)
 
 
 def _led_patches(camera: Camera, pen: Pen, view: View, optics: Optics) -> list[Patch]:
@@ -212,7 +170,7 @@ def _add_patches(levels: LightArray, patches: list[Patch]) -> list[Window]:
     for patch in patches:
         top, left = patch.top, patch.left
         height, width = patch.levels.shape
-        window = _clipped(levels, Window(top, top + height, left, left + width))
+        window = clipped(levels, Window(top, top + height, left, left + width))
         if window is not None:
             rows = slice(window.top - top, window.bottom - top)
             columns = slice(window.left - left, window.right - left)
@@ -221,59 +179,14 @@ def _add_patches(levels: LightArray, patches: list[Patch]) -> list[Window]:
     return windows
 
 
-def _add_glare(levels: LightArray, glare: Glare, exposure: float) -> list[Window]:
-    window = _window_round(levels, glare.outline, glare.softness)
-    if window is None:
-        return []
-    mask = _soft_polygon(window, glare.outline, glare.softness)
-    levels[window.slices] += np.float32(glare.level * exposure) * mask
-    return [window]
-
-
-def _darken(levels: LightArray, finger: Finger) -> None:
-    window = _window_round(levels, finger.outline, finger.softness)
-    if window is not None:
-        mask = _soft_polygon(window, finger.outline, finger.softness)
-        levels[window.slices] *= 1 - mask
-
-
-def _window_round(
-    levels: LightArray, outline: FloatArray, softness: float
-) -> Window | None:
-    left, top = np.floor(outline.min(axis=0) - 4 * softness - 1).astype(int)
-    right, bottom = np.ceil(outline.max(axis=0) + 4 * softness + 2).astype(int)
-    return _clipped(levels, Window(top, bottom, left, right))
-
-
-def _clipped(levels: LightArray, window: Window) -> Window | None:
+def clipped(levels: LightArray, window: Window) -> Window | None:
+    """Return the part of a window that is within an image; None if it is outside."""
     height, width = levels.shape
-    clipped = Window(
+    inside = Window(
         max(int(window.top), 0),
         min(int(window.bottom), height),
         max(int(window.left), 0),
         min(int(window.right), width),
     )
-    empty = clipped.top >= clipped.bottom or clipped.left >= clipped.right
-    return None if empty else clipped
-
-
-def _soft_polygon(window: Window, outline: FloatArray, softness: float) -> LightArray:
-    fine = _fine_polygon(window, outline, POLYGON_SAMPLES)
-    size = (window.right - window.left, window.bottom - window.top)
-    covered = cv2.resize(fine, size, interpolation=cv2.INTER_AREA)
-    soft = cv2.GaussianBlur(
-        covered.astype(np.float32), (0, 0), softness, borderType=cv2.BORDER_REPLICATE
-    )
-    return np.asarray(soft / 255, dtype=np.float32)
-
-
-def _fine_polygon(
-    window: Window, outline: FloatArray, samples: int
-) -> npt.NDArray[np.uint8]:
-    """Return 255 inside a polygon, with ``samples`` fine pixels per pixel and axis."""
-    height, width = window.bottom - window.top, window.right - window.left
-    mask = np.zeros((samples * height, samples * width), dtype=np.uint8)
-    corners = outline - np.array([window.left, window.top]) + 0.5
-    scaled = np.rint((corners * samples - 0.5) * 2**OUTLINE_BITS).astype(np.int32)
-    cv2.fillPoly(mask, [scaled], 255, shift=OUTLINE_BITS)
-    return mask
+    empty = inside.top >= inside.bottom or inside.left >= inside.right
+    return None if empty else inside

@@ -16,8 +16,7 @@ from lightpen.formats.files import mark_simulated, why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_camera, write_rig
 from lightpen.model.ellipse import disc_images
-from lightpen.model.pen import pen_frame_from_raw
-from lightpen.model.rigid import Rig, fit_rigid, from_first, vector_from_rotation
+from lightpen.model.rigid import Rig, fit_rigid, from_first
 from lightpen_extensions.simulator.faces import disc_contours, measure_insides
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
@@ -26,9 +25,9 @@ from lightpen_extensions.simulator.image_plans import (
     plan_scene,
     render_plan,
 )
-from lightpen_extensions.simulator.render import hidden_fraction, led_levels
+from lightpen_extensions.simulator.render import led_levels
 from lightpen_extensions.simulator.scenes import Scene, beside
-from lightpen_extensions.simulator.swings import edge_gaps, leds_in_camera
+from lightpen_extensions.simulator.swings import leds_in_camera
 
 Json: TypeAlias = dict[str, Any]
 Report: TypeAlias = Callable[[float], None]
@@ -38,9 +37,8 @@ NOTES = (
     "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
     "conic image of the disc contour in the undistorted normalised plane, then "
     "distorted to px; centroid: area centroid of the exact distorted disc region; all "
-    "of the whole disc at mid-exposure. visible: lit and not wholly hidden. saturated: "
-    "brighter than full scale. occluded_fraction: share of the disc's area behind "
-    "fingers or outside the image."
+    "of the whole disc at mid-exposure. visible: lit. saturated: brighter than full "
+    "scale."
 )
 
 
@@ -63,12 +61,18 @@ def write_scene(
     the true ones best. Raises `FileError` if the folder is not empty or cannot be
     written.
     """
+    return write_plan(plan_scene(scene), folder, report)
+
+
+def write_plan(
+    plan: ScenePlan, folder: Path, report: Report = lambda fraction: None
+) -> FloatArray:
+    """Write the set of a plan; see `write_scene`."""
     images = folder / "images"
-    names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
+    names = [f"frame_{i + 1:04d}.png" for i in range(plan.scene.n_images)]
     _make_folders(folder, images)
     mark_simulated(folder)
-    plan = plan_scene(scene)
-    write_camera(scene.camera, folder / "camera.yaml")
+    write_camera(plan.scene.camera, folder / "camera.yaml")
     _write_measured_pen(plan, folder)
     _write_images(plan, images, names, report)
     truth = {"set": folder.name, **scene_truth(plan)}
@@ -250,7 +254,6 @@ def _in_order(
 def _pen_truth(plan: ScenePlan) -> Json:
     scene = plan.scene
     measured = plan.measured_pen.leds
-    tip_measured = _tip_in_file_frame(plan)
     return {
         "tip": scene.tip_pen.tolist(),
         "leds": scene.pen.leds.tolist(),
@@ -258,24 +261,7 @@ def _pen_truth(plan: ScenePlan) -> Json:
         "disc_radius_mm": scene.pen.diameter / 2,
         "radiance_gain": plan.gains.tolist(),
         "leds_measured_csv": measured.tolist(),
-        "tip_in_leds_csv_frame_bestfit": tip_measured.tolist(),
-        **_frame_truth(scene.pen.leds, measured, tip_measured),
-    }
-
-
-def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Json:
-    """Return the tip in the frame that the paper defines by the measured LEDs."""
-    try:
-        R, t = pen_frame_from_raw(measured)
-        R_true, t_true = pen_frame_from_raw(leds)
-    except FileError:  # a pen of another layout, which has no such frame
-        return {}
-    return {
-        "tip_in_frame_redefined_from_leds_csv": (R @ tip + t).tolist(),
-        "frame_definition_check": {
-            "rotation_minus_identity_max": float(np.abs(R_true - np.eye(3)).max()),
-            "origin_abs_max": float(np.abs(t_true).max()),
-        },
+        "tip_in_leds_csv_frame_bestfit": _tip_in_file_frame(plan).tolist(),
     }
 
 
@@ -288,34 +274,17 @@ def _image_truth(plan: ScenePlan, image_plan: ImagePlan, folder: str) -> Json:
             swing.postures.rolls[index],
         ]
     )
-    gaps = edge_gaps(
-        scene.camera, scene.pen, image_plan.rotation[None], image_plan.translation[None]
-    )
     return {
         "file": f"{folder}frame_{index + 1:04d}.png",
         "R": image_plan.rotation.tolist(),
         "T": image_plan.translation.tolist(),
-        "rvec": vector_from_rotation(image_plan.rotation).tolist(),
         "tip_cam": swing.tips_cam[index].tolist(),
         "posture": {
             "tilt_deg": tilt,
             "tilt_dir_deg": direction % 360,
             "roll_deg": roll,
         },
-        "min_gap_px": float(gaps[0]),
-        "flags": list(image_plan.flags),
         "tip_in_cone": not swing.slipped[index],
-        "exposure": image_plan.optics.exposure,
-        "psf_gauss_sigma_px": image_plan.optics.psf_sigma,
-        "defocus_radius_px": image_plan.optics.defocus_radius,
-        "lamps": [
-            {
-                "center": lamp.center.tolist(),
-                "semi_axes": list(lamp.semi_axes),
-                "level": lamp.level,
-            }
-            for lamp in image_plan.view.lamps
-        ],
         "leds": _led_truths(scene, image_plan),
     }
 
@@ -329,7 +298,6 @@ def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
     )
     insides = measure_insides(contours)
     levels = view.gains * led_levels(leds, normals, image_plan.optics)
-    hidden = [hidden_fraction(camera, nodes, view.fingers) for nodes in contours.nodes]
     projected = camera.project(leds)
     cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)
     return [
@@ -343,8 +311,7 @@ def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
             **_axes_truth(ellipses.shapes[led]),
             "area_px": float(insides.areas[led]),
             "view_angle_deg": float(np.degrees(np.arccos(cosines[led]))),
-            "visible": bool(levels[led] > 0 and hidden[led] < 1),
-            "occluded_fraction": hidden[led],
+            "visible": bool(levels[led] > 0),
             "saturated": bool(levels[led] >= 1),
         }
         for led in range(pen.n_leds)

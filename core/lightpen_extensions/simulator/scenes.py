@@ -1,7 +1,7 @@
 """Scenes, and the sensor that takes their images."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Literal, TypeAlias
@@ -184,50 +184,6 @@ def _dark_distribution(
     return values, np.diff(upper, prepend=0.0)
 
 
-@dataclass(frozen=True)
-class Disturbances:
-    """Fractions of the images that are disturbed, each 0 to 1."""
-
-    clutter: float = 0.0  # foreign lamps, reflections, bright windows
-    fingers: float = 0.0  # a finger before an LED
-    missing: float = 0.0  # one to four LEDs off
-    motion_blur: float = 0.0
-    defocus: float = 0.0
-    saturated: float = 0.0
-    dim: float = 0.0
-    slipped: float = 0.0  # the tip is 0.2 to 2 mm out of the cone
-    blurred_away: float = 0.0  # moved so fast that nothing can be measured
-    empty: float = 0.0  # all LEDs off
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            fraction = getattr(self, item.name)
-            if not 0 <= fraction <= 1:
-                raise ValueError(
-                    f"`{item.name}` must be a fraction from 0 to 1, got {fraction}."
-                )
-        if self.slipped + self.blurred_away + self.empty > 1:
-            raise ValueError(
-                "`slipped`, `blurred_away` and `empty` must not exceed 1 together."
-            )
-
-
-CLEAN = Disturbances()
-HARD = Disturbances(
-    clutter=0.6,
-    fingers=0.2,
-    missing=0.25,
-    motion_blur=0.2,
-    defocus=0.15,
-    saturated=0.12,
-    dim=0.15,
-    slipped=0.02,
-    blurred_away=0.02,
-    empty=0.02,
-)
-SCENES = {"clean": CLEAN, "hard": HARD}
-
-
 FaceKind: TypeAlias = Literal["even", "hot-spot", "dome", "ring"]
 
 
@@ -257,7 +213,6 @@ class Scene:
     n_images: int = 60
     seed: int = 1
     swing: SwingKind = "field"  # see `postures.draw_postures`
-    disturbances: Disturbances = CLEAN
     optics: Optics = field(default_factory=Optics)
     sensor: Sensor = field(default_factory=Sensor)
     # Even, an off-centre spot, a dome whose bright part moves, or a dark centre.

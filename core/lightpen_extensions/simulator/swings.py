@@ -311,27 +311,6 @@ def seen_from(swing: Swing, R: FloatArray, t: FloatArray) -> Swing:
     )
 
 
-def slip_tip(
-    swing: Swing,
-    frames: BoolArray,
-    distances: FloatArray | float,
-    rng: np.random.Generator,
-) -> Swing:
-    """Return the swing with the tip out of the cone in the frames of a mask (F,).
-
-    It is off the bottom of the cone by the distances, mm, in a random direction.
-    """
-    directions = rng.standard_normal(swing.tips_cam.shape)
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    lengths = np.where(frames, distances, 0.0)
-    offsets = directions * lengths[:, None]
-    return replace(
-        swing,
-        tips_cam=swing.tips_cam + offsets,
-        translations=swing.translations + offsets,
-    )
-
-
 def simulate_centers(
     camera: Camera,
     pen: Pen,

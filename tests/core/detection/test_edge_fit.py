@@ -6,6 +6,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_disturbances import Finger
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import EdgeFits, EdgeStarts, fit_edges
@@ -17,7 +18,6 @@ from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene
 from lightpen_extensions.simulator.render import render_view
 from lightpen_extensions.simulator.scenes import LEDS, Scene, expose
 from lightpen_extensions.simulator.swings import leds_in_camera
-from lightpen_extensions.simulator.view import Finger
 
 N_IMAGES = 3
 BESIDE = 15.0  # px, of a spot that is still that of a disc
@@ -42,7 +42,7 @@ def scene(leds: str, diameter: float = 10.0, blur: float = 0.8) -> Scene:
 
 
 def show(scene: Scene, plan: ImagePlan, *fingers: Finger) -> DisplayedImage:
-    view = replace(plan.view, fingers=fingers)
+    view = replace(plan.view, others=fingers)
     light = render_view(scene.camera, scene.pen, view, plan.optics)
     image = expose(light, scene.sensor, np.random.default_rng(plan.index))
     leds, normals = leds_in_camera(scene.pen, plan.rotation, plan.translation)

@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_disturbances import HARD, Finger, Glare, plan_disturbed
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
@@ -25,10 +26,10 @@ from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene, render_plan
-from lightpen_extensions.simulator.scenes import HARD, Scene, Sensor, six_led_pen
+from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
+from lightpen_extensions.simulator.scenes import Scene, Sensor, six_led_pen
 from lightpen_extensions.simulator.swings import flat_pen, leds_in_camera
-from lightpen_extensions.simulator.view import Finger, Glare, Lamp
+from lightpen_extensions.simulator.view import Lamp
 
 SCENE = Scene()
 CAMERA, PEN = SCENE.camera, SCENE.pen
@@ -86,7 +87,7 @@ def merged(n_leds: int) -> ImagePlan:
 def covered(start: FloatArray, radius: float) -> ImagePlan:
     """Return the pen with a finger before it, from there to the right."""
     finger = Finger(start, start + AWAY, radius)
-    return replace(SHOT, view=replace(SHOT.view, fingers=(finger,)))
+    return replace(SHOT, view=replace(SHOT.view, others=(finger,)))
 
 
 def lamplit(
@@ -124,7 +125,7 @@ def strewn_lamps() -> list[FloatArray]:
 
 def window() -> ImagePlan:
     corners = np.array([[100.0, 100], [400, 150], [380, 900], [90, 800]])
-    return replace(SHOT, view=replace(SHOT.view, glares=(Glare(corners, 1.2),)))
+    return replace(SHOT, view=replace(SHOT.view, others=(Glare(corners, 1.2),)))
 
 
 FEW = (0, 2, 4, 6)
@@ -264,8 +265,8 @@ def test_hard_images_show_the_same_live_and_on_files() -> None:
     It may label one that a start is not sure of.
     """
     disturbances = replace(HARD, blurred_away=0.1, empty=0.1)
-    scene = Scene(n_images=20, seed=3, disturbances=disturbances)
-    plan = plan_scene(scene)
+    scene = Scene(n_images=20, seed=3)
+    plan = plan_disturbed(scene, disturbances)
     images = [render_plan(scene, shot) for shot in plan.image_plans]
     files = on_files(images)
     assert len(set(files.reasons)) > 2
@@ -334,7 +335,7 @@ def test_a_recorded_image_is_as_deep_as_on_files() -> None:
 def test_light_that_is_masked_is_no_smear() -> None:
     streak = np.array([[300.0, 300], [1500, 420], [1500, 430], [300, 320]])
     glare = Glare(streak, 0.5, softness=5.0)
-    image = shown(replace(SHOT, view=replace(lit().view, glares=(glare,))))
+    image = shown(replace(SHOT, view=replace(lit().view, others=(glare,))))
     mask = np.array([[900.0, 365.0, 700.0]])
 
     for circles, reason in ((None, Reason.BLURRED), (mask, Reason.EMPTY)):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_disturbances import slip_tip
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -19,7 +20,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
-    slip_tip,
     swing_poses,
 )
 

@@ -3,16 +3,19 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.simulated_disturbances import (
+    HARD,
+    SLIP,
+    Disturbances,
+    Finger,
+    flags_of,
+    plan_disturbed,
+)
 from tests.simulated_plans import live_plan
 
-from lightpen_extensions.simulator.image_plans import SLIP, plan_scene, render_plan
-from lightpen_extensions.simulator.scenes import (
-    HARD,
-    SAMPLE_PENS,
-    SCENES,
-    Disturbances,
-    Scene,
-)
+from lightpen.arrays import Image
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS, Scene
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     leds_in_camera,
@@ -23,8 +26,8 @@ CAMERA = paper_camera()
 
 
 def test_same_seed_gives_the_same_images_in_any_order() -> None:
-    scene = Scene(n_images=20, seed=3, disturbances=HARD)
-    one, two = plan_scene(scene), plan_scene(scene)
+    scene = Scene(n_images=20, seed=3)
+    one, two = plan_disturbed(scene), plan_disturbed(scene)
     for index in (7, 2):
         np.testing.assert_array_equal(
             render_plan(scene, one.image_plans[index]),
@@ -40,32 +43,31 @@ def test_other_seed_gives_another_swing() -> None:
 
 
 def test_each_disturbance_hits_its_fraction_of_the_images() -> None:
-    plan = plan_scene(Scene(n_images=100, seed=5, disturbances=HARD))
+    plan = plan_disturbed(Scene(n_images=100, seed=5))
     for name, fraction in vars(HARD).items():
-        n_hit = sum(name in image_plan.flags for image_plan in plan.image_plans)
+        n_hit = sum(name in flags_of(image_plan) for image_plan in plan.image_plans)
         assert n_hit == round(100 * fraction), name
 
 
 def test_spoilt_images_suffer_nothing_else() -> None:
-    plan = plan_scene(Scene(n_images=100, seed=6, disturbances=HARD))
+    plan = plan_disturbed(Scene(n_images=100, seed=6))
     for image_plan in plan.image_plans:
-        if {"empty", "blurred_away"} & set(image_plan.flags):
-            assert len(image_plan.flags) == 1
-        assert not {"saturated", "dim"} <= set(image_plan.flags)
+        if {"empty", "blurred_away"} & set(flags_of(image_plan)):
+            assert len(flags_of(image_plan)) == 1
+        assert not {"saturated", "dim"} <= set(flags_of(image_plan))
 
 
 def test_clean_scene_is_undisturbed() -> None:
     plan = plan_scene(Scene(n_images=10))
-    assert not any(image_plan.flags for image_plan in plan.image_plans)
+    assert not any(image_plan.view.others for image_plan in plan.image_plans)
     assert not plan.swing.slipped.any()
-    assert SCENES["clean"] == Disturbances()
 
 
 def test_slipped_images_have_their_tip_out_of_the_cone() -> None:
-    scene = Scene(n_images=30, seed=7, disturbances=Disturbances(slipped=0.5))
-    plan = plan_scene(scene)
+    scene = Scene(n_images=30, seed=7)
+    plan = plan_disturbed(scene, Disturbances(slipped=0.5))
     flagged = np.array(
-        ["slipped" in image_plan.flags for image_plan in plan.image_plans]
+        ["slipped" in flags_of(image_plan) for image_plan in plan.image_plans]
     )
     np.testing.assert_array_equal(plan.swing.slipped, flagged)
     distances = np.linalg.norm(plan.swing.tips_cam - PAPER_CONE, axis=1)
@@ -78,7 +80,7 @@ def test_slipped_images_have_their_tip_out_of_the_cone() -> None:
 
 def test_missing_leds_are_dark_and_one_to_four() -> None:
     wanted = Disturbances(missing=1.0)
-    plan = plan_scene(Scene(n_images=30, seed=8, disturbances=wanted))
+    plan = plan_disturbed(Scene(n_images=30, seed=8), wanted)
     n_off = [int((image_plan.view.gains == 0).sum()) for image_plan in plan.image_plans]
     assert set(n_off) == {1, 2, 3, 4}
     image_plan = plan.image_plans[0]
@@ -91,22 +93,24 @@ def test_missing_leds_are_dark_and_one_to_four() -> None:
 
 
 def test_pen_of_six_leds_keeps_at_least_four() -> None:
-    scene = Scene(
-        n_images=30, pen=SAMPLE_PENS["six"](), disturbances=Disturbances(missing=1.0)
-    )
-    for image_plan in plan_scene(scene).image_plans:
+    scene = Scene(n_images=30, pen=SAMPLE_PENS["six"]())
+    for image_plan in plan_disturbed(scene, Disturbances(missing=1.0)).image_plans:
         assert (image_plan.view.gains > 0).sum() >= 4
 
 
+def rendered(wanted: Disturbances) -> Image:
+    """Return the only image of a scene."""
+    scene = Scene(n_images=1)
+    return render_plan(scene, plan_disturbed(scene, wanted).image_plans[0])
+
+
 def test_empty_image_holds_noise_only() -> None:
-    scene = Scene(n_images=1, disturbances=Disturbances(empty=1.0))
-    image = render_plan(scene, plan_scene(scene).image_plans[0])
+    image = rendered(Disturbances(empty=1.0))
     assert image.max() <= 2
 
 
 def test_image_blurred_away_has_no_edges() -> None:
-    scene = Scene(n_images=1, disturbances=Disturbances(blurred_away=1.0))
-    image = render_plan(scene, plan_scene(scene).image_plans[0]).astype(float)
+    image = rendered(Disturbances(blurred_away=1.0)).astype(float)
     assert image.max() > 10
     # A disc in focus rises by 100 in one pixel.
     smooth = image.reshape(512, 4, 612, 4).mean(axis=(1, 3))
@@ -114,18 +118,8 @@ def test_image_blurred_away_has_no_edges() -> None:
 
 
 def test_dim_and_saturated_images_differ_in_exposure_only() -> None:
-    plain, dim, saturated = (
-        Scene(n_images=1, disturbances=wanted)
-        for wanted in (
-            Disturbances(),
-            Disturbances(dim=1.0),
-            Disturbances(saturated=1.0),
-        )
-    )
-    peaks = [
-        np.percentile(render_plan(scene, plan_scene(scene).image_plans[0]), 99.8)
-        for scene in (plain, dim, saturated)
-    ]
+    wanted = Disturbances(), Disturbances(dim=1.0), Disturbances(saturated=1.0)
+    peaks = [np.percentile(rendered(each), 99.8) for each in wanted]
     assert 170 < peaks[0] < 215
     assert 10 < peaks[1] < 60
     assert peaks[2] == 255
@@ -133,19 +127,17 @@ def test_dim_and_saturated_images_differ_in_exposure_only() -> None:
 
 def test_clutter_and_fingers_leave_most_leds_whole() -> None:
     wanted = Disturbances(clutter=1.0, fingers=1.0)
-    scene = Scene(n_images=12, seed=9, disturbances=wanted)
-    clean = replace(scene, disturbances=Disturbances())
+    scene = Scene(n_images=12, seed=9)
     n_touched = []
-    for image_plan in plan_scene(scene).image_plans:
+    for image_plan in plan_disturbed(scene, wanted).image_plans:
         assert image_plan.view.lamps
-        [_] = image_plan.view.fingers
+        others = image_plan.view.others
+        assert [isinstance(each, Finger) for each in others].count(True) == 1
         leds, _ = leds_in_camera(scene.pen, image_plan.rotation, image_plan.translation)
         columns, rows = np.rint(CAMERA.project(leds)).astype(int).T
         image = render_plan(scene, image_plan).astype(float)
-        alone = replace(
-            image_plan, view=replace(image_plan.view, lamps=(), glares=(), fingers=())
-        )
-        free = render_plan(clean, alone).astype(float)
+        alone = replace(image_plan.view, lamps=(), others=())
+        free = render_plan(scene, replace(image_plan, view=alone)).astype(float)
         n_touched.append(int((np.abs(image - free)[rows, columns] > 40).sum()))
     assert max(n_touched) <= 4
     assert sum(n_touched) > 0

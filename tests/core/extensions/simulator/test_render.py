@@ -5,18 +5,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_disturbances import Finger, Glare, hidden_fraction, moving_poses
 from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen_extensions.simulator.faces import disc_contours, measure_insides
-from lightpen_extensions.simulator.render import (
-    Light,
-    Window,
-    hidden_fraction,
-    led_levels,
-    render_view,
-)
+from lightpen_extensions.simulator.render import Light, led_levels, render_view
 from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
@@ -25,14 +20,7 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
     swing_poses,
 )
-from lightpen_extensions.simulator.view import (
-    Finger,
-    Glare,
-    Lamp,
-    Optics,
-    View,
-    moving_poses,
-)
+from lightpen_extensions.simulator.view import Lamp, Optics, View, Window
 
 CAMERA = paper_camera()
 PEN = paper_pen()
@@ -142,7 +130,7 @@ def test_finger_hides_what_is_behind_it() -> None:
     # Its long lower side runs through the lamp's centre.
     finger = Finger(np.array([-50.0, 60.0]), np.array([250.0, 60.0]), 20.0)
     view = replace(DARK, lamps=(lamp,))
-    shown = render_view(SMALL, PEN, replace(view, fingers=(finger,)), Optics())
+    shown = render_view(SMALL, PEN, replace(view, others=(finger,)), Optics())
     free = render_view(SMALL, PEN, view, Optics())
     assert shown.levels[66, 100] < 1e-3
     assert shown.levels[94, 100] == pytest.approx(1, abs=1e-3)
@@ -165,7 +153,7 @@ def test_hidden_fraction_is_the_covered_share_of_the_area() -> None:
 
 def test_glare_has_its_level_inside_and_soft_edges() -> None:
     square = np.array([[50.0, 40.0], [150, 40], [150, 120], [50, 120]])
-    view = replace(DARK, glares=(Glare(square, level=0.6, softness=4.0),))
+    view = replace(DARK, others=(Glare(square, level=0.6, softness=4.0),))
     levels = render_view(SMALL, PEN, view, Optics(exposure=2.0)).levels
     assert levels[80, 100] == pytest.approx(1.2, abs=1e-4)
     assert levels[80, 50] == pytest.approx(0.6, abs=0.06)
@@ -174,7 +162,7 @@ def test_glare_has_its_level_inside_and_soft_edges() -> None:
 
 def test_window_larger_than_the_image_is_bright_up_to_the_border() -> None:
     square = np.array([[-500.0, -500.0], [900, -500], [900, 900], [-500, 900]])
-    view = replace(DARK, glares=(Glare(square, level=0.5, softness=3.0),))
+    view = replace(DARK, others=(Glare(square, level=0.5, softness=3.0),))
     levels = render_view(SMALL, PEN, view, Optics()).levels
     np.testing.assert_allclose(levels, 0.5, atol=1e-5)
 

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from lightpen_extensions.simulator.render import Light, Window
+from lightpen_extensions.simulator.render import Light
 from lightpen_extensions.simulator.scenes import Sensor, expose
+from lightpen_extensions.simulator.view import Window
 
 SHAPE = (400, 500)
 WHOLE = Window(0, SHAPE[0], 0, SHAPE[1])

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_disturbances import slip_tip
 
 from lightpen.model.ellipse import ellipse_centers
 from lightpen_extensions.simulator.scenes import SAMPLE_PENS
@@ -20,7 +21,6 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
     perturbed_pen,
     simulate_centers,
-    slip_tip,
     swing_from_postures,
     swing_poses,
 )
