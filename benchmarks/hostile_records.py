@@ -98,7 +98,7 @@ def make_data(folder: Path) -> Data:
     _, newest = sorted(archive.folder.iterdir())
     settings = Settings(folder / "lightpen.json")
     settings.set_station("Hall 3", Station(Names(operator="Ann", pen="LP-04")))
-    settings.set_last_station("Hall 3")
+    settings.set_last(station="Hall 3")
     settings.await_saved(60.0)
     return Data(folder, swing, newest, settings.file)
 
@@ -255,7 +255,7 @@ def _read_settings(file: Path) -> None:
     settings.preferences()
     for name in settings.stations():
         settings.station(name)
-    settings.last_station()
+    settings.last()
 
 
 def _mutated_file(file: Path, content: bytes, rng: np.random.Generator) -> bytes:

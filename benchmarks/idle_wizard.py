@@ -53,7 +53,7 @@ def main() -> int:
                 limits=MANY,
             ),
         )
-        settings.set_last_station(NAMES.station)
+        settings.set_last(station=NAMES.station)
         wizard = Wizard(application, faces(), settings, Path(folder))
         wizard.show()
         _until(

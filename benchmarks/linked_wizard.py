@@ -127,7 +127,7 @@ def _settings(folder: Path, scene: Scene) -> Settings:
         limits=SwingLimits(min_images=N_IMAGES, max_images=N_IMAGES),
     )
     settings.set_station("Bench", station)
-    settings.set_last_station("Bench")
+    settings.set_last(station="Bench")
     return settings
 
 

@@ -37,6 +37,7 @@ from lightpen_app.work.workbench import Workbench
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TICK_MS = 100
+FOLDER = "folder"  # cause of a notification
 
 
 class EndSignals(QObject):
@@ -217,8 +218,13 @@ class Wizard(QObject):
 
     def _on_folder_fault_changed(self, fault: str) -> None:
         """Advise another data folder while this one cannot be written."""
-        folder = str(self.workbench.folder)
-        self.window.set_unwritable(folder if fault else "", fault)
+        notices = self.workbench.notifications
+        notices.withdraw(FOLDER)
+        if fault:
+            way = self.tr(
+                "Choose the data folder at Set up station or in the options (F10)."
+            )
+            notices.notify(FOLDER, f"{fault} {way}")
 
     def _open_log(self) -> None:
         folder = log_file(self.workbench.folder).parent

@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QFrame, QWidget
 from typing_extensions import override
 
 from lightpen.record.swings.header import Names
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
     from lightpen.archive.chains import Event, StoredEntry
     from lightpen.archive.trends import Trend
+    from lightpen.live.sources import Operator
+    from lightpen.model.names import Laboratory
     from lightpen.record.exports import ExportFormat
     from lightpen.record.swings.solving import Solution
     from lightpen.swing.status import SwingStatus
@@ -114,6 +118,36 @@ class ReportPrinter(QObject):
 
     def shut_down(self) -> None:
         """Cancel what is not shown yet."""
+
+
+class SimulatorControls(Translated, QFrame):
+    """Controls of the simulated operator, hidden with a real pen; these are empty.
+
+    A subclass calls `_follow_connection` once it has its buttons.
+    """
+
+    def __init__(self, live: LiveView) -> None:
+        super().__init__()
+        self._live = live
+        self.hide()
+
+        # Connections
+        live.connection_changed.connect(self._follow_connection)
+
+    def invite(self) -> None:
+        """Let the operator work, as the button of `set_inviting` invites to."""
+
+    def set_inviting(self, inviting: bool) -> None:
+        """Draw a button filled: one button of a page is, at most."""
+
+    def _follow_connection(self) -> None:
+        """Show the controls for a simulated operator; each camera has its own."""
+        self.setVisible(self._live.operator is not None)
+
+    def _command(self, act: "Callable[[Operator], object]") -> None:
+        """Have the operator do something, if there is one."""
+        if operator := self._live.operator:
+            act(operator)
 
 
 class BudgetRow(QWidget):
@@ -214,12 +248,22 @@ class Service(QObject):
         """Return formats in which a calibration can be saved."""
         return ()
 
+    def ask_laboratory(
+        self, page: QWidget, then: "Callable[[Laboratory], object]"
+    ) -> None:
+        """Ask for the laboratory that its formats name, and pass it on."""
+        raise NotImplementedError
+
     def report_printer(self, place: "SavePlace", page: QWidget) -> ReportPrinter | None:
         """Make what shows reports, for a page."""
         return None
 
     def budget_row(self) -> BudgetRow | None:
         """Make a check of the budget."""
+        return None
+
+    def swing_controls(self) -> SimulatorControls | None:
+        """Make the controls of the simulated operator for the step Swing."""
         return None
 
     def press_comparison(self) -> PressComparison | None:
@@ -288,6 +332,12 @@ def report_printer(
     """Return what shows reports for a page."""
     printers = (each.report_printer(place, page) for each in services)
     return next(filter(None, printers), None) or ReportPrinter(page)
+
+
+def swing_controls(services: Services, live: LiveView) -> SimulatorControls:
+    """Return the controls of the simulated operator."""
+    found = (each.swing_controls() for each in services)
+    return next(filter(None, found), None) or SimulatorControls(live)
 
 
 def press_comparison(services: Services) -> PressComparison:

@@ -15,9 +15,9 @@ from lightpen_app_extensions.exports import EXPORTS
 from lightpen_app_extensions.measure import MEASURE
 from lightpen_app_extensions.plant import PLANT
 from lightpen_app_extensions.report import REPORT
+from lightpen_app_extensions.simulator import SIMULATOR
 from lightpen_app_extensions.stream import STREAM
 from lightpen_extensions.drivers.extension import DRIVERS
-from lightpen_extensions.simulator.extension import SIMULATOR
 
 PARTS: tuple[Extension | Faced, ...] = (  # each after what it needs
     SIMULATOR,

@@ -38,7 +38,7 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
             files=FilePaths(str(files.camera_file.path), str(files.pen_file.path)),
         ),
     )
-    settings.set_last_station("Hall 2")
+    settings.set_last(station="Hall 2")
 
     walker = open_wizard()
     walker.until_tells(f"The data folder {data} is not writable: the disk is")
@@ -51,7 +51,6 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
     walker.main_button().click()
     walker.until_shows("Swing")
     walker.until_says("No swing")
-    walker.until_tells(WAY)
     walker.window.resize(940, 500)
     walker.until_tells("The disk is read-only.")
     assert min(letters(walker)) >= TextSize.SMALL

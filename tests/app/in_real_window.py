@@ -30,7 +30,7 @@ def test_the_operator_view_fills_the_screen(
             camera=StoredCamera(SourceChoice()),
         ),
     )
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     while walker.title() != "Swing":
         walker.until(walker.main_button().isEnabled)

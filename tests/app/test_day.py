@@ -27,7 +27,7 @@ KNOWN = Station(
 def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     """The program at a station that was set up before."""
     settings.set_station("Hall 2", KNOWN)
-    settings.set_last_station("Hall 2")
+    settings.set_last(station="Hall 2")
     return open_wizard()
 
 

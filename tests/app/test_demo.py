@@ -116,7 +116,7 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
 ) -> None:
     hopeless = Station(limits=SwingLimits(1e-6, 10, 12))
     settings.set_station(NAMES.station, hopeless)
-    settings.set_last_station(NAMES.station)
+    settings.set_last(station=NAMES.station)
     walker = open_wizard()
     demo = Demo(walker.window, walker.workbench, is_watched=False)
 

@@ -11,12 +11,12 @@ from tests.app.room import clipped_words, scrolled_sideways
 from lightpen.record.library.tip_library import ItemKind
 from lightpen_app.shell.menus import About, HelpWindow
 from lightpen_app.steps.camera.intrinsics_panel import PartDialog
-from lightpen_app.steps.review.result_export import LaboratoryDialog
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, LimitsDialog
 from lightpen_app.widgets.fitting import FRAME, DialogScroll, fitted_place
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.boards.window import BoardWindow
+from lightpen_app_extensions.exports.laboratory_dialog import LaboratoryDialog
 from lightpen_app_extensions.stream.service import StreamDialog
 from lightpen_extensions.simulator.swings import paper_camera
 

@@ -52,7 +52,7 @@ def marked(
         name = {ListedPen: NAMES.pen, ListedTip: NAMES.tip}.get(item, NAMES.cone)
         add_item(data, item(id=name, note=MARK, certificate=MARK), by, NOON)
     settings.set_station(NAMES.station, Station(NAMES, limits=SwingLimits()))
-    settings.set_last_station(NAMES.station)
+    settings.set_last(station=NAMES.station)
     return open_wizard()
 
 

@@ -222,7 +222,7 @@ def test_no_english_word_is_left_after_a_change_to_chinese(
         limits=SwingLimits(0.02, min_images=20),
     )
     settings.set_station("2\u53f7", station)
-    settings.set_last_station("2\u53f7")
+    settings.set_last(station="2\u53f7")
     walker = open_wizard()
     walker.until(
         lambda: len(walker.window.pages()) == len(page_titles(walker.services))

@@ -49,7 +49,7 @@ def prepared(
     for module in (rules, view):
         monkeypatch.setattr(f"{module}.COUNTDOWN", 1.0)
     settings.set_station(STATION, LONG)
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     return open_wizard()
 
 

@@ -80,7 +80,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
             limits=SwingLimits(0.02, min_images=15, max_images=80),
         ),
     )
-    settings.set_last_station("Hall 2")
+    settings.set_last(station="Hall 2")
 
     walker = open_wizard(SourceEnvironment(SceneSimulator(scene), clock))
     rendered.operator.seat()

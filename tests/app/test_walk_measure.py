@@ -42,7 +42,7 @@ PROBING = Station(
 def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     """The program at a station with a tip in force and the plan of a dome."""
     settings.set_station(STATION, PROBING)
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
@@ -120,7 +120,7 @@ def test_without_a_plan_the_step_says_what_to_do(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
     settings.set_station(STATION, replace(PROBING, extensions={}))
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)

@@ -32,7 +32,7 @@ CHOSEN = Station(
 def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     """The program at a station that is known, with a tip in force."""
     settings.set_station(STATION, CHOSEN)
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)

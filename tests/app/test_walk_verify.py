@@ -42,7 +42,7 @@ TOUCHES = Station(
 def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     """The program at a station that is known, with a tip in force."""
     settings.set_station(STATION, TOUCHES)
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
@@ -143,7 +143,7 @@ def test_without_a_tip_in_force_the_step_says_so(
     settings.set_station(
         STATION, replace(TOUCHES, names=replace(TOUCHES.names, tip="T-99"))
     )
-    settings.set_last_station(STATION)
+    settings.set_last(station=STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     walker.click_step("Verify")

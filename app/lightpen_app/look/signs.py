@@ -1,9 +1,22 @@
 """Symbols for states, distinguished by shape and drawn without a font."""
 
 from enum import Enum, auto
+from functools import lru_cache
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtCore import QByteArray, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QIcon,
+    QPainter,
+    QPainterPath,
+    QPen,
+    QPixmap,
+    QPolygonF,
+)
+from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QWidget
+
+from lightpen_app.look.theme import GRID, Tone, colors_of
 
 
 class Sign(Enum):
@@ -22,24 +35,65 @@ class Sign(Enum):
     RING = auto()
 
 
+SIDE = 2 * GRID  # px, of an icon
+# Paths of SVG about the middle of a square of 24, as lines or filled.
+_LINES = {
+    Sign.CHECK: "M-8,0.5 L-2.5,6 L8,-6",
+    Sign.CROSS: "M-6.5,-6.5 L6.5,6.5 M6.5,-6.5 L-6.5,6.5",
+    Sign.WARNING: "M0,-9 L10,8.5 L-10,8.5 Z M0,-2.5 V2.2 M0,5.4 V5.5",
+    Sign.EYE: "M-10,0 C-5,-8.5 5,-8.5 10,0 C5,8.5 -5,8.5 -10,0 "
+    "M-2.2,0 a2.2,2.2 0 1 0 4.4,0 a2.2,2.2 0 1 0 -4.4,0",
+    Sign.WAIT: "M-9.5,0 a9.5,9.5 0 1 0 19,0 a9.5,9.5 0 1 0 -19,0 M0,-5 V0 L4,2.6",
+    Sign.RING: "M-6.5,0 a6.5,6.5 0 1 0 13,0 a6.5,6.5 0 1 0 -13,0",
+}
+_SOLIDS = {
+    Sign.PLAY: "M-6.5,-9 L9,0 L-6.5,9 Z",
+    Sign.PAUSE: "M-8,-9 h5.6 v18 h-5.6 z M2.4,-9 h5.6 v18 h-5.6 z",
+    Sign.RECORD: "M-8.5,0 a8.5,8.5 0 1 0 17,0 a8.5,8.5 0 1 0 -17,0",
+    Sign.LOCK: "M-7.5,-2 h15 v11.5 h-15 z "
+    "M-5.5,-1 v-3.5 a5.5,5.5 0 0 1 11,0 v3.5 h-2.5 v-3.5 a3,3 0 0 0 -6,0 v3.5 z",
+}
+_SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-12 -12 24 24">'
+    '<path d="{}" {} stroke-linecap="round" stroke-linejoin="round"/></svg>'
+)
+
+
 def draw_sign(painter: QPainter, box: QRectF, sign: Sign, color: QColor) -> None:
     """Draw a sign as large as the smaller side of a box allows, in its middle."""
-    side = min(box.width(), box.height())
-    if sign is Sign.NONE or side <= 0:
-        return
-    painter.save()
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.translate(box.center())
-    painter.scale(side / 24, side / 24)
-    if sign in _OUTLINES:
-        painter.setPen(_pen(color, 3))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawPath(_OUTLINES[sign]())
-    else:
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(color)
-        painter.drawPath(_SOLIDS[sign]())
-    painter.restore()
+    if sign in _LINES:
+        look = f'fill="none" stroke-width="3" stroke="{color.name()}"'
+        draw_svg(painter, box, _SVG.format(_LINES[sign], look))
+    elif sign in _SOLIDS:
+        look = f'fill="{color.name()}"'
+        draw_svg(painter, box, _SVG.format(_SOLIDS[sign], look))
+
+
+def draw_svg(painter: QPainter, box: QRectF, svg: str) -> None:
+    """Draw a picture in the middle of a box, as large as it fits."""
+    if not box.isEmpty():
+        painter.save()
+        _renderer(svg).render(painter, box)
+        painter.restore()
+
+
+@lru_cache(maxsize=64)  # the same are drawn again with every image
+def _renderer(svg: str) -> QSvgRenderer:
+    renderer = QSvgRenderer(QByteArray(svg.encode()))
+    renderer.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
+    return renderer
+
+
+def sign_icon(widget: QWidget, sign: Sign, tone: Tone) -> QIcon:
+    """Return a sign as an icon in the colours of a widget."""
+    scale = widget.devicePixelRatioF()
+    picture = QPixmap(round(SIDE * scale), round(SIDE * scale))
+    picture.setDevicePixelRatio(scale)
+    picture.fill(Qt.GlobalColor.transparent)
+    color = colors_of(widget.palette()).tone(tone)
+    with QPainter(picture) as painter:
+        draw_sign(painter, QRectF(0, 0, SIDE, SIDE), sign, color)
+    return QIcon(picture)
 
 
 def draw_arrow(
@@ -71,122 +125,11 @@ def _arrow(start: QPointF, end: QPointF, width: float) -> QPainterPath:
     along = end - start
     length = max((along.x() ** 2 + along.y() ** 2) ** 0.5, 1e-6)
     ahead = along / length
-    aside = QPointF(-ahead.y(), ahead.x())
+    aside = QPointF(-ahead.y(), ahead.x()) * width
     neck = end - ahead * min(1.8 * width, length)
+    shaft = (start + aside / 2, neck + aside / 2, neck + aside * 1.25, end)
+    other = (neck - aside * 1.25, neck - aside / 2, start - aside / 2)
     path = QPainterPath()
-    path.addPolygon(
-        QPolygonF(
-            [
-                start + aside * width / 2,
-                neck + aside * width / 2,
-                neck + aside * width * 1.25,
-                end,
-                neck - aside * width * 1.25,
-                neck - aside * width / 2,
-                start - aside * width / 2,
-            ]
-        )
-    )
+    path.addPolygon(QPolygonF([*shaft, *other]))
     path.closeSubpath()
     return path
-
-
-def _pen(color: QColor, width: float) -> QPen:
-    return QPen(
-        color,
-        width,
-        Qt.PenStyle.SolidLine,
-        Qt.PenCapStyle.RoundCap,
-        Qt.PenJoinStyle.RoundJoin,
-    )
-
-
-def _lines(*strokes: tuple[tuple[float, float], ...]) -> QPainterPath:
-    path = QPainterPath()
-    for first, *others in strokes:
-        path.moveTo(*first)
-        for point in others:
-            path.lineTo(*point)
-    return path
-
-
-def _check() -> QPainterPath:
-    return _lines(((-8, 0.5), (-2.5, 6), (8, -6)))
-
-
-def _cross() -> QPainterPath:
-    return _lines(((-6.5, -6.5), (6.5, 6.5)), ((6.5, -6.5), (-6.5, 6.5)))
-
-
-def _warning() -> QPainterPath:
-    path = _lines(((0, -9), (10, 8.5), (-10, 8.5), (0, -9), (10, 8.5)))
-    path.addPath(_lines(((0, -2.5), (0, 2.2)), ((0, 5.4), (0, 5.5))))
-    return path
-
-
-def _eye() -> QPainterPath:
-    path = QPainterPath(QPointF(-10, 0))
-    path.cubicTo(-5, -8.5, 5, -8.5, 10, 0)
-    path.cubicTo(5, 8.5, -5, 8.5, -10, 0)
-    path.addEllipse(QPointF(0, 0), 2.2, 2.2)
-    return path
-
-
-def _wait() -> QPainterPath:
-    path = QPainterPath()
-    path.addEllipse(QPointF(0, 0), 9.5, 9.5)
-    path.addPath(_lines(((0, -5), (0, 0), (4, 2.6))))
-    return path
-
-
-def _ring() -> QPainterPath:
-    path = QPainterPath()
-    path.addEllipse(QPointF(0, 0), 6.5, 6.5)
-    return path
-
-
-def _play() -> QPainterPath:
-    path = _lines(((-6.5, -9), (9, 0), (-6.5, 9)))
-    path.closeSubpath()
-    return path
-
-
-def _pause() -> QPainterPath:
-    path = QPainterPath()
-    path.addRoundedRect(QRectF(-8, -9, 5.6, 18), 1, 1)
-    path.addRoundedRect(QRectF(2.4, -9, 5.6, 18), 1, 1)
-    return path
-
-
-def _record() -> QPainterPath:
-    path = QPainterPath()
-    path.addEllipse(QPointF(0, 0), 8.5, 8.5)
-    return path
-
-
-def _lock() -> QPainterPath:
-    path = QPainterPath()
-    path.addRoundedRect(QRectF(-7.5, -2, 15, 11.5), 2, 2)
-    shackle = QPainterPath(QPointF(-5.5, -1))
-    shackle.lineTo(-5.5, -4.5)
-    shackle.arcTo(QRectF(-5.5, -10, 11, 11), 180, -180)
-    shackle.lineTo(5.5, -1)
-    shackle.lineTo(3, -1)
-    shackle.lineTo(3, -4.5)
-    shackle.arcTo(QRectF(-3, -7.5, 6, 6), 0, 180)
-    shackle.lineTo(-3, -1)
-    shackle.closeSubpath()
-    path.addPath(shackle)
-    path.setFillRule(Qt.FillRule.WindingFill)
-    return path
-
-
-_OUTLINES = {
-    Sign.CHECK: _check,
-    Sign.CROSS: _cross,
-    Sign.WARNING: _warning,
-    Sign.EYE: _eye,
-    Sign.WAIT: _wait,
-    Sign.RING: _ring,
-}
-_SOLIDS = {Sign.PLAY: _play, Sign.PAUSE: _pause, Sign.RECORD: _record, Sign.LOCK: _lock}

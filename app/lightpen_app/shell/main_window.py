@@ -208,10 +208,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Press the main button, if it can be pressed."""
         self._action_bar.press_main()
 
-    def set_unwritable(self, folder: str, fault: str) -> None:
-        """Show why the data folder cannot be written; an empty text ends it."""
-        self._notice.set_unwritable(folder, fault)
-
     def close_unasked(self) -> None:
         """Close without a question, since nobody may be present."""
         self._asks = False

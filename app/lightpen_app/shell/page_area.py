@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QCoreApplication, QDeadlineTimer, QEvent, QObject, Qt, Signal
+from PySide6.QtCore import QDeadlineTimer, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QWindow
 from PySide6.QtWidgets import QFrame, QLineEdit, QSizePolicy, QStackedWidget, QWidget
 from typing_extensions import override
@@ -29,18 +29,13 @@ from lightpen_app.widgets.page import MainAction, Page
 
 
 class NoticeBar(Translated, QFrame):
-    """Bar for a message, hidden without one; Close hides it.
-
-    While the data folder cannot be written, a message on it says where to choose
-    another one, and appears once.
-    """
+    """Bar for a message, hidden without one; Close hides it."""
 
     value_changed = Signal(str)  # its text; empty if it shows none
 
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("area", "notice")
-        self._unwritable = self._fault = ""  # the data folder, and why
 
         # Widgets
         self._text = text_label(TextSize.BODY)
@@ -61,10 +56,6 @@ class NoticeBar(Translated, QFrame):
 
     def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Say a sentence, instead of an earlier one."""
-        shown, is_of_folder = self.text(), self._with_way(text) != text
-        if is_of_folder and shown == self._with_way(self._fault):
-            return
-        text = self._with_way(text)
         self._text.setText(text)
         self._text.setAccessibleName(text)
         set_tone(self, tone)
@@ -74,33 +65,14 @@ class NoticeBar(Translated, QFrame):
 
     def drop(self, text: str) -> None:
         """Remove a message whose cause has ended."""
-        if self.text() in (text, self._with_way(text)):
+        if self.text() == text:
             self.clear()
-
-    def set_unwritable(self, folder: str, fault: str) -> None:
-        """Show why the data folder cannot be written; an empty text ends it."""
-        if fault:
-            self._unwritable, self._fault = folder, fault
-            self.show_text(fault)
-        else:
-            self.drop(self._fault)
-            self._unwritable = self._fault = ""
 
     def clear(self) -> None:
         """Clear the message."""
         self._text.clear()
         self.hide()
         self.value_changed.emit("")
-
-    def _with_way(self, text: str) -> str:
-        """Return a sentence, of an unwritable data folder with the way to another."""
-        if not self._unwritable or self._unwritable not in text:
-            return text
-        way = QCoreApplication.translate(
-            "MainWindow",
-            "Choose the data folder at Set up station or in the options (F10).",
-        )
-        return f"{text} {way}"
 
 
 LONG_LEAD = 120  # letters, from which it has a row of its own

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
-from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QFrame, QSizePolicy, QWidget
+from PySide6.QtCore import QPoint, QSize, Qt, Signal
+from PySide6.QtWidgets import QFrame, QLabel, QWidget
 from typing_extensions import override
 
 from lightpen.model.names import Origin
@@ -15,8 +14,8 @@ from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.signs import Sign, draw_sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, text_label
+from lightpen_app.look.signs import SIDE, Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_styled, text_label
 from lightpen_app.look.words import PARTED, set_tooltip, shortened
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
@@ -88,10 +87,7 @@ def _step(status: Status, *, is_now: bool) -> Step:
     return Step(status.title, state)
 
 
-SIGN_SIZE = 2 * GRID
-SIGN_LEFT, NARROW_SIGN_LEFT = 5 * GRID // 2, 3 * GRID // 2
-TEXT_LEFT, NARROW_TEXT_LEFT = 6 * GRID, 9 * GRID // 2
-WRAPPED = int(Qt.TextFlag.TextWordWrap)
+INDENT = 33  # px, of a reason, below the words of its step
 MARKS = {
     StepState.DONE: (Sign.CHECK, Tone.GOOD),
     StepState.DOUBTFUL: (Sign.WARNING, Tone.WARN),
@@ -101,18 +97,15 @@ MARKS = {
 }
 
 
-class StepButton(Translated, QAbstractButton):
-    """One step: its sign, its name, and why it is closed."""
+class StepButton(Translated, PushButton):
+    """One step: its sign and its name."""
 
-    def __init__(self, step: Step, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, step: Step) -> None:
+        super().__init__(0)
         self._step = step
-        self._is_narrow = False
-        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        policy.setHeightForWidth(True)
-        self.setSizePolicy(policy)
+        self.setFlat(True)
+        self.setIconSize(QSize(SIDE, SIDE))
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leads to the page
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self._retranslate()
 
     def value(self) -> Step:
@@ -124,77 +117,6 @@ class StepButton(Translated, QAbstractButton):
         if step != self._step:
             self._step = step
             self._retranslate()
-            self.updateGeometry()
-            self.update()
-
-    def set_narrow(self, narrow: bool) -> None:
-        """Draw the sign and the words nearer to the edge and to each other."""
-        self._is_narrow = narrow
-        self.updateGeometry()
-        self.update()
-
-    @override
-    def sizeHint(self) -> QSize:
-        width = (16 if self._is_narrow else 28) * GRID
-        return QSize(width, self.heightForWidth(width))
-
-    @override
-    def heightForWidth(self, width: int) -> int:
-        height = 5 * GRID
-        if self._step.shows_reason:
-            height += round(self._reason_height(width)) + GRID
-        return height
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        step = self._step
-        colors = colors_of(self.palette())
-        sign, tone = MARKS[step.state]
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        edge = GRID / 2 if self._is_narrow else GRID
-        box = QRectF(self.rect()).adjusted(edge, 0, -edge, 0)
-        if step.state is StepState.NOW or self.underMouse():
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(colors.raised))
-            painter.drawRoundedRect(box, 6, 6)
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(colors.accent), 2))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(box.adjusted(1, 1, -1, -1), 6, 6)
-        left = NARROW_SIGN_LEFT if self._is_narrow else SIGN_LEFT
-        mark = QRectF(left, 1.5 * GRID, SIGN_SIZE, SIGN_SIZE)
-        draw_sign(painter, mark, sign, colors.tone(tone))
-        now = step.state is StepState.NOW
-        bright = step.state not in (StepState.TO_DO, StepState.CLOSED)
-        painter.setPen(QColor(colors.text if bright else colors.muted))
-        painter.setFont(font(TextSize.BODY, bold=now))
-        name = QRectF(
-            self._text_left, 0, self.width() - self._text_left - GRID, 5 * GRID
-        )
-        painter.drawText(name, Qt.AlignmentFlag.AlignVCenter, step.title)
-        if step.shows_reason:
-            painter.setPen(QColor(colors.muted))
-            painter.setFont(font(TextSize.SMALL))
-            reason = QRectF(
-                self._text_left,
-                4.5 * GRID,
-                self._reason_width(self.width()),
-                self.height(),
-            )
-            painter.drawText(reason, WRAPPED, step.why_closed)
-
-    @property
-    def _text_left(self) -> int:
-        return NARROW_TEXT_LEFT if self._is_narrow else TEXT_LEFT
-
-    def _reason_width(self, width: int) -> float:
-        return width - self._text_left - (1 if self._is_narrow else 2) * GRID
-
-    def _reason_height(self, width: int) -> float:
-        metrics = QFontMetricsF(font(TextSize.SMALL))
-        room = QRectF(0, 0, self._reason_width(width), 1e4)
-        return metrics.boundingRect(room, WRAPPED, self._step.why_closed).height()
 
     @override
     def _retranslate(self) -> None:
@@ -205,12 +127,19 @@ class StepButton(Translated, QAbstractButton):
             StepState.TO_DO: self.tr("to do"),
             StepState.CLOSED: self.tr("closed"),
         }
-        self.setAccessibleName(f"{self._step.title}, {words[self._step.state]}")
+        state = self._step.state
+        self.setText(self._step.title)
+        self.set_mark(*MARKS[state])
+        set_styled(self, "step", state.name)
+        self.setAccessibleName(f"{self._step.title}, {words[state]}")
         self.setAccessibleDescription(self._step.why_closed)
 
 
 class StepList(Translated, QWidget):
-    """List of the steps; a click, Space or Enter requests one."""
+    """List of the steps, with the reason of one that is closed.
+
+    A click, Space or Enter requests a step.
+    """
 
     step_chosen = Signal(int)  # index of the step, which may be closed
 
@@ -218,7 +147,7 @@ class StepList(Translated, QWidget):
         super().__init__()
         self.say(self, self.tr("Steps"))
         self._buttons: list[StepButton] = []
-        self._is_narrow = False
+        self._reasons: list[QLabel] = []
         self._layout = vertical_layout(self, spacing=GRID // 2)
 
     def steps(self) -> tuple[Step, ...]:
@@ -232,24 +161,24 @@ class StepList(Translated, QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Show the steps narrow or wide."""
-        self._is_narrow = narrow
-        for button in self._buttons:
-            button.set_narrow(narrow)
+        side = GRID // 2 if narrow else GRID
+        self._layout.setContentsMargins(side, 0, side, 0)
 
     def set_steps(self, steps: Sequence[Step]) -> None:
-        """Show these steps."""
-        for button, step in zip(self._buttons, steps, strict=False):
-            button.set_value(step)
+        """Show these steps; there are never fewer than before."""
         for index in range(len(self._buttons), len(steps)):
-            button = StepButton(steps[index], self)
-            button.set_narrow(self._is_narrow)
+            button = StepButton(steps[index])
             button.clicked.connect(lambda _=False, at=index: self.step_chosen.emit(at))
+            reason = text_label(TextSize.SMALL, Tone.QUIET)
+            reason.setContentsMargins(INDENT, 0, 0, GRID)
             self._buttons.append(button)
-            self._layout.addWidget(button)
-        while len(self._buttons) > len(steps):
-            button = self._buttons.pop()
-            self._layout.removeWidget(button)
-            button.deleteLater()
+            self._reasons.append(reason)
+            fill(self._layout, button, reason)
+        shown = zip(self._buttons, self._reasons, steps, strict=True)
+        for button, reason, step in shown:
+            button.set_value(step)
+            reason.setText(step.why_closed)
+            reason.setVisible(step.shows_reason)
 
 
 WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
@@ -310,7 +239,7 @@ class Sidebar(Translated, QFrame):
         self._head.setSpacing(GRID // 2)
         fill(self._head, self._status, self._origin, self._remark)
         content = QWidget()
-        vertical_layout(content, self._steps, 1)
+        self._content = vertical_layout(content, self._steps, 1)
         self._scroll = PageScroll()
         self._scroll.setWidget(content)
         fill(layout, (self._scroll, 1))
@@ -341,10 +270,6 @@ class Sidebar(Translated, QFrame):
         """Return the item as text, one line for each name."""
         return self._subject.text()
 
-    def subject_status(self) -> StatusMessage:
-        """Return the item that must not be used for measuring."""
-        return self._status.value()
-
     def set_subject(self, subject: Subject) -> None:
         """Show the item and the origin of its images."""
         if subject != self._value:
@@ -358,6 +283,7 @@ class Sidebar(Translated, QFrame):
     def _reveal_present(self) -> None:
         present = self._steps.present()
         if present is not None:
+            self._content.activate()  # a reason may have appeared
             self._scroll.ensureWidgetVisible(present, 0, 0)
 
     def _show_subject(self) -> None:

@@ -293,8 +293,8 @@ class WithdrawalBar(Translated, ReasonBar):
     def _retranslate(self) -> None:
         self.set_words(
             self.tr(
-                "Revoke this acceptance? The previous result becomes current again, "
-                "which a supervisor has to approve."
+                "Revoke this acceptance? The previous result becomes current again. "
+                "Both stay in the archive."
             ),
             self.tr("Reason"),
             self.tr("Revoke acceptance"),

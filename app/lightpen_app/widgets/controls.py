@@ -19,7 +19,8 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.signs import Sign, sign_icon
+from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import set_tooltip
 
 LEAST_WIDTH = 8 * GRID + 34  # px; with the padding and the border
@@ -37,6 +38,7 @@ class PushButton(QPushButton):
         self, least_width: int = LEAST_WIDTH, *, checkable: bool = False
     ) -> None:
         super().__init__()
+        self._mark = Sign.NONE, Tone.PLAIN
         self.setCheckable(checkable)
         self._least_width = least_width
 
@@ -45,6 +47,25 @@ class PushButton(QPushButton):
         self.setEnabled(not why_not)
         set_tooltip(self, why_not or tooltip)
         self.setAccessibleDescription(why_not or tooltip)
+
+    def set_mark(self, sign: Sign, tone: Tone) -> None:
+        """Show a sign before the words, in the colours of the theme."""
+        if (sign, tone) != self._mark:
+            self._mark = sign, tone
+            self._draw_mark()
+
+    def _draw_mark(self) -> None:
+        self.setIcon(sign_icon(self.window(), *self._mark))
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        is_marked = self._mark[0] is not Sign.NONE
+        if is_marked and event.type() in (
+            QEvent.Type.PaletteChange,
+            QEvent.Type.StyleChange,  # of a theme; the style sheet fixes the palette
+        ):
+            self._draw_mark()
 
     @override
     def sizeHint(self) -> QSize:

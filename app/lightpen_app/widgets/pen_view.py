@@ -12,7 +12,6 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QPen,
-    QPixmap,
     QPolygonF,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -30,7 +29,6 @@ KEY_STEP = math.radians(6)
 DRAG_STEP = math.radians(0.5)  # for each px
 CLICK_SLACK = 4  # px that a mouse may move while it clicks
 CLICK_REACH = 18.0  # px from an LED
-EYE = 8.0  # distance of the viewer, in radii of the pen
 AXIS_SHARE = 0.22  # length of an axis, of the pen's radius
 MARGIN = 2 * GRID
 N_CORNERS = 28
@@ -56,22 +54,15 @@ class _Projection:
     turn: FloatArray  # (3, 3), to right, up and towards the viewer
     center: FloatArray  # (3,), mm
     radius: float  # mm
-    scale: float  # px of widget per mm at the centre
+    scale: float  # px of widget per mm
     middle: QPointF
     shows_origin: bool
-
-    def nearness(self, points: FloatArray) -> FloatArray:
-        """Return the depth of points (..., 3), -1 at the back to 1 in front."""
-        near = (points - self.center) @ self.turn[2] / self.radius
-        return np.asarray(np.clip(near, -1, 1))
 
     def places(self, points: FloatArray) -> list[QPointF]:
         """Return the positions of points (N, 3)."""
         seen = (np.reshape(points, (-1, 3)) - self.center) @ self.turn.T
-        shrunk = self.scale / (1 - seen[:, 2] / (EYE * self.radius))
         return [
-            self.middle + QPointF(x, -y)
-            for x, y in (seen[:, :2] * shrunk[:, None]).tolist()
+            self.middle + QPointF(x, -y) for x, y in (seen[:, :2] * self.scale).tolist()
         ]
 
 
@@ -88,8 +79,6 @@ class PenView(Translated, QWidget):
         self._yaw, self._pitch = START_YAW, START_PITCH
         self._pressed: QPointF | None = None
         self._dragged = QPointF()
-        self._picture = QPixmap()
-        self._picture_shows: tuple[object, ...] = ()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
@@ -183,30 +172,8 @@ class PenView(Translated, QWidget):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        QPainter(self).drawPixmap(0, 0, self._drawn())
-
-    def _drawn(self) -> QPixmap:
-        """Return the drawing, which is kept while the page about it changes."""
-        colors, scale = colors_of(self.palette()), self.devicePixelRatio()
-        shows = (
-            self._value,
-            self._chosen,
-            *self.turned(),
-            self.hasFocus(),
-            self.size().toTuple(),
-            scale,
-            colors,
-            self.toolTip(),
-        )
-        if shows != self._picture_shows:
-            self._picture_shows = shows
-            self._picture = QPixmap(self.size() * scale)
-            self._picture.setDevicePixelRatio(scale)
-            self._picture.fill(Qt.GlobalColor.transparent)
-            painter = QPainter(self._picture)
-            self._draw(painter, colors)
-            painter.end()
-        return self._picture
+        with QPainter(self) as painter:
+            self._draw(painter, colors_of(self.palette()))
 
     def _draw(self, painter: QPainter, colors: Colors) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -226,39 +193,19 @@ class PenView(Translated, QWidget):
             painter.drawText(box, flags, self.tr("LED layout"))
             return
         sight = self._sight(pen)
-        if sight.shows_origin:
-            self._draw_plane(painter, sight, pen, colors)
         self._draw_axes(painter, sight, colors)
         if self._value.tip is not None:
             self._draw_tip(painter, sight, self._value.tip, colors)
         places = sight.places(pen.leds)
-        order = np.argsort(sight.nearness(pen.leds), kind="stable")
-        for row in order.tolist():
+        order = np.argsort(pen.leds @ sight.turn[2], kind="stable").tolist()
+        for row in order:
             self._draw_led(painter, sight, pen, row, colors)
         offset = sight.scale * pen.diameter / 2 + LABEL_GAP
         axes = np.vstack([np.zeros(3), *(share * np.eye(3) for share in (0.5, 1.0))])
         on_axes = sight.places(AXIS_SHARE * sight.radius * axes)
-        for row in order.tolist():
+        for row in order:
             others = [*places[:row], *places[row + 1 :], *on_axes]
             self._draw_number(painter, places[row], others, row, offset, colors)
-
-    def _draw_plane(
-        self, painter: QPainter, sight: _Projection, pen: Pen, colors: Colors
-    ) -> None:
-        """Draw the front plane z = 0, and from each LED a line to it."""
-        feet = pen.leds * np.array([1.0, 1.0, 0.0])
-        (left, low, _), (right, high, _) = (
-            feet.min(axis=0) - pen.diameter,
-            feet.max(axis=0) + pen.diameter,
-        )
-        sheet = [(left, low, 0), (right, low, 0), (right, high, 0), (left, high, 0)]
-        painter.setPen(QPen(QColor(colors.line), 1))
-        painter.setBrush(QColor(colors.panel))
-        painter.drawPolygon(QPolygonF(sight.places(np.array(sheet))))
-        painter.setPen(QPen(QColor(colors.edge), 1, Qt.PenStyle.DotLine))
-        tops, bottoms = sight.places(pen.leds), sight.places(feet)
-        for top, bottom in zip(tops, bottoms, strict=True):
-            painter.drawLine(top, bottom)
 
     def _draw_axes(self, painter: QPainter, sight: _Projection, colors: Colors) -> None:
         """Draw the axes at the origin, or in the corner if that is far away."""
@@ -292,9 +239,8 @@ class PenView(Translated, QWidget):
         self, painter: QPainter, sight: _Projection, pen: Pen, row: int, colors: Colors
     ) -> None:
         led, normal = pen.leds[row], pen.normals[row]
-        near = float(sight.nearness(led))
         tone = self._tone(row)
-        color = _faded(colors.tone(tone), QColor(colors.window), near)
+        color = colors.tone(tone)
         place = sight.places(led)[0]
         rim = sight.places(_rim(led, normal, max(pen.diameter / 2, self._least(sight))))
         painter.setPen(QPen(color, 1.5))
@@ -347,8 +293,7 @@ class PenView(Translated, QWidget):
         radius = max(float(np.linalg.norm(off, axis=1).max()), 1.0)
         aside = float(np.hypot(off[:, 0], off[:, 2]).max()) + pen.diameter
         width, height = self.width() - 2 * MARGIN, self.height() - 2 * MARGIN
-        enlarged = 1 - 1 / EYE  # of what is nearest to the viewer
-        scale = enlarged * min(width / 2 / aside, height / 2 / radius)
+        scale = min(width / 2 / aside, height / 2 / radius)
         middle = QPointF(self.width() / 2, self.height() / 2)
         turn = _turn_matrix(self._yaw, self._pitch)
         return _Projection(turn, center, radius, max(scale, 0.01), middle, shows_origin)
@@ -385,18 +330,6 @@ def _rim(center: FloatArray, normal: FloatArray, radius: float) -> FloatArray:
     v = np.cross(normal, u)
     around = np.cos(ROUND)[:, None] * u + np.sin(ROUND)[:, None] * v
     return np.asarray(center + radius * around)
-
-
-def _faded(color: QColor, ground: QColor, near: float) -> QColor:
-    """Return a colour as it looks through haze: whole in front, paler at the back."""
-    share = 0.72 + 0.28 * near
-    parts = (
-        (color.redF(), ground.redF()),
-        (color.greenF(), ground.greenF()),
-        (color.blueF(), ground.blueF()),
-    )
-    red, green, blue = (share * one + (1 - share) * other for one, other in parts)
-    return QColor.fromRgbF(red, green, blue)
 
 
 def _gap(one: QPointF, other: QPointF) -> float:

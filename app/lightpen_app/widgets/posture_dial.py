@@ -7,14 +7,7 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import (
-    QColor,
-    QFontMetricsF,
-    QPainter,
-    QPainterPath,
-    QPaintEvent,
-    QPen,
-)
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -23,9 +16,9 @@ from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.rigid import Posture
 from lightpen_app.look.signs import Sign, draw_arrow, draw_sign
 from lightpen_app.look.theme import Colors, TextSize, colors_of, font
+from lightpen_app.look.words import set_tooltip
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import fitted_size
-from lightpen_app.widgets.live_markers import CameraPosition, draw_camera
 
 MAX_TILT = math.radians(36)  # drawn at the rim
 TILTS = (0.0, *TILT_RINGS, MAX_TILT)
@@ -35,8 +28,8 @@ RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
 RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
 LEAST_BAR = 2.8  # of the least letters
-LEGEND_SHARE, NUMBER_SHARE = 0.09, 0.19  # of the rim, for letters
-LEGEND_SIZES = (1.0, 0.9, 0.8, 0.7)  # of the usual size, tried in turn
+NUMBER_SHARE = 0.19  # of the rim, for letters
+CAMERA_DISTANCE = 1.085  # from the middle of the dial; rim = 1
 NUMBERS = 1.4  # times the least letters, where they fit
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
@@ -143,6 +136,7 @@ class PostureDial(Translated, QWidget):
     def _describe(self) -> None:
         self.update()
         self.setAccessibleName(self.tr("Postures"))
+        set_tooltip(self, self.tr("Images needed in each posture, seen from above"))
         text = self.tr("{0} of {1} postures complete")
         self.setAccessibleDescription(
             text.format(self._value.n_full, self._value.n_fields)
@@ -154,7 +148,7 @@ class PostureDial(Translated, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colors = colors_of(self.palette())
         middle, rim, bar = self._places()
-        self._draw_surroundings(painter, middle, rim, bar)
+        self._draw_camera(painter, middle, rim, QColor(colors.muted))
         for place in _fields():
             self._draw_field(painter, middle, rim, place, colors)
         target = self._value.target
@@ -171,36 +165,21 @@ class PostureDial(Translated, QWidget):
             painter.setPen(QPen(QColor(colors.accent), 2))
             painter.drawEllipse(middle, 1.02 * rim, 1.02 * rim)
 
-    def _draw_surroundings(
-        self, painter: QPainter, middle: QPointF, rim: float, bar: QRectF
+    def _draw_camera(
+        self, painter: QPainter, middle: QPointF, rim: float, color: QColor
     ) -> None:
-        """Draw the camera, and what the numbers mean while there are any."""
-        value, colors = self._value, colors_of(self.palette())
-        size = max(LEGEND_SHARE * rim, self._least_letters)
-        draw_camera(
-            painter,
-            QRectF(0, 0, self.width(), bar.top()),
-            CameraPosition(middle, rim, value.heading - math.pi / 2),
-            self.tr("camera"),
-            size,
-            QColor(colors.muted),
-        )
-        if value.n_full < value.n_fields:
-            text = self.tr("images\nneeded")
-            self._draw_legend(painter, middle, rim, text, size)
-
-    def _draw_legend(
-        self, painter: QPainter, middle: QPointF, rim: float, text: str, size: float
-    ) -> None:
-        """Draw a text beside the rim, to the left above, as large as it finds room."""
-        painter.setPen(QColor(colors_of(self.palette()).muted))
-        sizes = (share * size for share in LEGEND_SIZES)
-        boxes = [(each, legend_box(text, each, middle, rim)) for each in sizes]
-        fitting = (each for each in boxes if each[1].left() >= 0)
-        chosen, box = next(fitting, boxes[-1])
-        box.moveLeft(max(box.left(), 0.0))
-        painter.setFont(font(chosen))
-        painter.drawText(box, int(Qt.TextFlag.TextDontClip), text)
+        """Draw a camera outside the rim that faces the dial."""
+        body = 0.055 * rim
+        painter.save()
+        painter.translate(middle)
+        painter.rotate(math.degrees(-self._value.heading))
+        painter.translate(0, CAMERA_DISTANCE * rim)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(color)
+        case = QRectF(-1.5 * body, -0.5 * body, 3 * body, 1.6 * body)
+        painter.drawRoundedRect(case, 3, 3)
+        painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
+        painter.restore()
 
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""
@@ -377,15 +356,6 @@ def _turn_x(box: QRectF, turn: float) -> float:
     """Return the position of a turn (rad) on the bar, px."""
     share = float(np.clip(turn / MAX_TURN, -1, 1))
     return box.center().x() + share * box.width() / 2
-
-
-def legend_box(text: str, size: float, middle: QPointF, rim: float) -> QRectF:
-    """Return the box of a text beside the rim, to the left above; size in px."""
-    words = QFontMetricsF(font(size)).size(0, text)
-    top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
-    right = middle.x() - math.sqrt(1 - top**2) * rim
-    left = min(max(middle.x() - 1.15 * rim, 0.0), right - words.width())
-    return QRectF(QPointF(left, middle.y() - rim), words)
 
 
 def _reaches(

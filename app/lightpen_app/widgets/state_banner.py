@@ -8,10 +8,8 @@ from PySide6.QtCore import QCoreApplication, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QFontMetricsF,
-    QIcon,
     QPainter,
     QPaintEvent,
-    QPixmap,
     QResizeEvent,
     QShowEvent,
 )
@@ -23,7 +21,7 @@ from lightpen.record.library.tip_library import ItemKind, StationStatus, TipStat
 from lightpen.record.swings.header import Names
 from lightpen_app.look.layouts import announce, horizontal_layout
 from lightpen_app.look.phrases import origin_text
-from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.signs import SIDE, Sign, draw_sign
 from lightpen_app.look.theme import (
     GRID,
     TextSize,
@@ -227,9 +225,6 @@ class StateBanner(QWidget):
             painter.drawText(detail_box, wrapped, detail)
 
 
-SIDE = 2 * GRID
-
-
 @dataclass(frozen=True)
 class StatusMessage:
     """Message with its sign and tone."""
@@ -346,19 +341,6 @@ def status_message(status: TipStatus | None) -> StatusMessage:
     if status is None:
         return StatusMessage()
     return StatusMessage(status_text(status), *_MARKS[status])
-
-
-def message_icon(remark: StatusMessage, widget: QWidget) -> QIcon:
-    """Return the sign of a remark as an icon in the colours of a widget."""
-    scale = widget.devicePixelRatioF()
-    picture = QPixmap(round(SIDE * scale), round(SIDE * scale))
-    picture.setDevicePixelRatio(scale)
-    picture.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(picture)
-    color = colors_of(widget.palette()).tone(remark.tone)
-    draw_sign(painter, QRectF(0, 0, SIDE, SIDE), remark.sign, color)
-    painter.end()
-    return QIcon(picture)
 
 
 def subject_message(

@@ -201,7 +201,7 @@ class SavePlace:
 
     def folder(self) -> Path:
         """Return the last folder; at first the user's documents."""
-        chosen = self.settings.export_folder()
+        chosen = self.settings.last().export_folder
         if chosen:
             return Path(chosen)
         documents = QStandardPaths.StandardLocation.DocumentsLocation
@@ -209,7 +209,7 @@ class SavePlace:
 
     def remember(self, folder: Path) -> None:
         """Offer this folder from now on."""
-        self.settings.set_export_folder(str(folder))
+        self.settings.set_last(export_folder=str(folder))
 
     def stem(self) -> str:
         """Return the beginning of a file name."""

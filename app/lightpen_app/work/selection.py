@@ -117,7 +117,7 @@ class Selection(QObject):
 
     def open_last_station(self) -> None:
         """Restore the last station, or begin the first one."""
-        name = self._settings.last_station()
+        name = self._settings.last().station
         if name:
             self.choose_station(name)
         else:
@@ -165,7 +165,7 @@ class Selection(QObject):
     def _remember_last(self) -> None:
         station = self._preparation.names.station
         if station not in ("", TRIAL.station):
-            self._settings.set_last_station(station)
+            self._settings.set_last(station=station)
 
     def _remember(self) -> None:
         name = self._preparation.names.station

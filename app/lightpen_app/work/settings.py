@@ -6,7 +6,7 @@ window.
 """
 
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar, get_type_hints
@@ -176,6 +176,16 @@ class Preferences:
 Group = TypeVar("Group")  # a frozen dataclass
 
 
+@dataclass(frozen=True)
+class LastChoices:
+    """What was chosen last, whatever the station."""
+
+    station: str = ""
+    export_folder: str = ""  # results are saved in it
+    hidden_columns: tuple[int, ...] = ()  # of the table of History
+    laboratory: Laboratory | None = None  # named by a certificate
+
+
 class Settings(QObject):
     """The settings; missing and invalid values give the default."""
 
@@ -267,45 +277,14 @@ class Settings(QObject):
         """Store the settings of an extension."""
         self._save("extensions", {key: stored_group(value)})
 
-    def last_station(self) -> str:
-        """Return the name of the station used last; empty at first."""
-        saved = self._content.get("last", {}).get("station")
-        return saved if isinstance(saved, str) else ""
+    def last(self) -> LastChoices:
+        """Return the last choices; the laboratory is at first that of the machine."""
+        usual = LastChoices(laboratory=self._machine.laboratory)
+        return read_group(self._content.get("last"), usual)
 
-    def set_last_station(self, name: str) -> None:
-        """Remember which station is used."""
-        self._save("last", {"station": name})
-
-    def export_folder(self) -> str:
-        """Return the folder that results were saved in last; empty at first."""
-        saved = self._content.get("last", {}).get("export folder")
-        return saved if isinstance(saved, str) else ""
-
-    def set_export_folder(self, folder: str) -> None:
-        """Remember where results are saved."""
-        self._save("last", {"export folder": folder})
-
-    def hidden_columns(self) -> tuple[int, ...]:
-        """Return the columns that the table of History does not show."""
-        try:
-            return in_shape(self._content["last"]["columns"], tuple[int, ...])
-        except (KeyError, DamagedError):
-            return ()
-
-    def set_hidden_columns(self, columns: tuple[int, ...]) -> None:
-        """Remember the columns that are not shown."""
-        self._save("last", {"columns": list(columns)})
-
-    def laboratory(self) -> Laboratory | None:
-        """Return the last named laboratory, by default that of the machine settings."""
-        try:
-            return in_shape(self._content["last"]["laboratory"], Laboratory)
-        except (KeyError, DamagedError):
-            return self._machine.laboratory
-
-    def set_laboratory(self, laboratory: Laboratory) -> None:
-        """Remember the laboratory that a certificate names."""
-        self._save("last", {"laboratory": asdict(laboratory)})
+    def set_last(self, **choices: object) -> None:
+        """Remember choices by the names of `LastChoices`."""
+        self._save("last", stored_group(choices))
 
     def machine_limits(self) -> StationLimits:
         """Return the limits of this computer, which a station uses at first."""

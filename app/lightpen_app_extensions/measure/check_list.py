@@ -10,10 +10,10 @@ from typing_extensions import override
 
 from lightpen_app.look.languages import worded
 from lightpen_app.look.phrases import DECISION_MARKS
-from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.signs import Sign, draw_sign, sign_icon
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.look.words import decimals_for, number_text
-from lightpen_app.widgets.state_banner import StatusMessage, message_icon
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_extensions.measure.tasks.task import Band
 
 ROW = Qt.ItemDataRole.UserRole  # a `CheckRow`
@@ -72,7 +72,7 @@ class CheckList(QListWidget):
             item.setData(ROW, row)
             item.setText(row.words)
             sign = StatusMessage("", row.sign, row.tone)
-            item.setIcon(message_icon(sign, self.window()))
+            item.setIcon(sign_icon(self.window(), sign.sign, sign.tone))
         self.blockSignals(False)
 
     def show_row(self, index: int) -> None:

@@ -18,13 +18,13 @@ from lightpen_app.face import (
     ReadinessItem,
     RowWords,
     Service,
+    SimulatorControls,
 )
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone, set_styled
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
-from lightpen_app.steps.simulator_controls import SimulatorControls
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import RunView
@@ -322,8 +322,8 @@ class ProbingSimulatorControls(SimulatorControls):
 
         self._follow_connection()
 
+    @override
     def set_inviting(self, inviting: bool) -> None:
-        """Draw its button filled: one button of a page is, at most."""
         set_styled(self._touch, "inviting", "true" if inviting else "")
 
     def stop(self) -> None:

@@ -59,7 +59,7 @@ def write_report(result: Path, out: Path | None, language: str) -> Path:
     from lightpen_app_extensions.report.pages import pdf_of
 
     # The laboratory was named in the window, or is that of this computer.
-    content = read_content(result, Settings(settings_file()).laboratory())
+    content = read_content(result, Settings(settings_file()).last().laboratory)
     if not has_display():
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     application = make_application(sys.argv[:1])

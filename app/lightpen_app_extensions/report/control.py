@@ -44,7 +44,7 @@ class PrintReportControl(ReportPrinter):
 
     @override
     def show(self, find: Callable[[], Path]) -> None:
-        laboratory = self._place.settings.laboratory()
+        laboratory = self._place.settings.last().laboratory
         read = partial(read_content, laboratory=laboratory)
         self._reading.start(lambda _: read(find()), self._open, self.failed)
 

@@ -1766,18 +1766,6 @@
         <translation>选择光笔和测头后显示上次标定。</translation>
     </message>
     <message>
-        <source>Revoke this acceptance? The previous result becomes current again.</source>
-        <translation>撤销此次接受吗？前一结果将重新成为当前结果。</translation>
-    </message>
-    <message>
-        <source>Revoke acceptance</source>
-        <translation>撤销接受</translation>
-    </message>
-    <message>
-        <source>Keep acceptance</source>
-        <translation>保持接受</translation>
-    </message>
-    <message>
         <source>Accepted. Reason: {0}</source>
         <translation>已接受。理由：{0}</translation>
     </message>
@@ -1901,25 +1889,6 @@
     <message>
         <source>Find pen, camera and tip by one swing and one length.</source>
         <translation>由一次摆动和一个长度求光笔、相机和测头。</translation>
-    </message>
-</context>
-<context>
-    <name>LedSimulatorControls</name>
-    <message>
-        <source>Tilt pen</source>
-        <translation>倾斜光笔</translation>
-    </message>
-    <message>
-        <source>Tilts the simulated pen to all sides until switched off</source>
-        <translation>使模拟光笔向各个方向倾斜，直到关闭</translation>
-    </message>
-    <message>
-        <source>Cover LEDs</source>
-        <translation>遮挡 LED</translation>
-    </message>
-    <message>
-        <source>Covers three LEDs of the simulated pen</source>
-        <translation>遮住模拟光笔的三个 LED</translation>
     </message>
 </context>
 <context>
@@ -2361,10 +2330,6 @@
     <message>
         <source>Pen tip calibration</source>
         <translation>光笔测头标定</translation>
-    </message>
-    <message>
-        <source>Choose the data folder at Set up station or in the options (F10).</source>
-        <translation>请在“设置工位”或选项 (F10) 中选择数据文件夹。</translation>
     </message>
 </context>
 <context>
@@ -3018,18 +2983,12 @@
         <translation>姿态</translation>
     </message>
     <message>
+        <source>Images needed in each posture, seen from above</source>
+        <translation>各姿态还需要的图像数（俯视）</translation>
+    </message>
+    <message>
         <source>{0} of {1} postures complete</source>
         <translation>{1} 个姿态中已完成 {0} 个</translation>
-    </message>
-    <message>
-        <source>camera</source>
-        <translation>相机</translation>
-    </message>
-    <message>
-        <source>images
-needed</source>
-        <translation>所需
-图像</translation>
     </message>
     <message>
         <source>turn about the pen&apos;s own axis</source>
@@ -3453,18 +3412,6 @@ needed</source>
     <message>
         <source>Continue with these</source>
         <translation>沿用这些图像</translation>
-    </message>
-    <message>
-        <source>Revoke this acceptance? The previous result becomes current again. Both stay in the archive.</source>
-        <translation>撤销此次接受吗？前一结果将重新成为当前结果。两者都保留在档案库中。</translation>
-    </message>
-    <message>
-        <source>Revoke acceptance</source>
-        <translation>撤销接受</translation>
-    </message>
-    <message>
-        <source>Keep acceptance</source>
-        <translation>保持接受</translation>
     </message>
     <message>
         <source>The tip appears here after the swing.</source>
@@ -4102,18 +4049,6 @@ needed</source>
     <message>
         <source>Clear mask</source>
         <translation>清除屏蔽</translation>
-    </message>
-    <message>
-        <source>Uncover the LEDs</source>
-        <translation>取消遮挡</translation>
-    </message>
-    <message>
-        <source>Cover the LEDs</source>
-        <translation>遮住 LED</translation>
-    </message>
-    <message>
-        <source>Done by the simulated operator</source>
-        <translation>由模拟操作员完成</translation>
     </message>
     <message>
         <source>No images are received.</source>
@@ -5018,8 +4953,8 @@ needed</source>
 <context>
     <name>WithdrawalBar</name>
     <message>
-        <source>Revoke this acceptance? The previous result becomes current again, which a supervisor has to approve.</source>
-        <translation>撤销此次接受？之前的结果将重新成为当前结果，这需要主管批准。</translation>
+        <source>Revoke this acceptance? The previous result becomes current again. Both stay in the archive.</source>
+        <translation>撤销此次接受吗？前一结果将重新成为当前结果。两者都保留在档案库中。</translation>
     </message>
     <message>
         <source>Reason</source>
@@ -5043,6 +4978,10 @@ needed</source>
     <message>
         <source>An internal error occurred. The program can continue; all images are saved. No report was written: the disk is full or write-protected.</source>
         <translation>发生内部错误。程序可继续运行；全部图像已保存。无法写入报告：磁盘已满或没有写入权限。</translation>
+    </message>
+    <message>
+        <source>Choose the data folder at Set up station or in the options (F10).</source>
+        <translation>请在“设置工位”或选项 (F10) 中选择数据文件夹。</translation>
     </message>
 </context>
 <context>

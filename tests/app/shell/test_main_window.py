@@ -625,33 +625,6 @@ def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
 
 
-def test_what_is_reported_an_unwritable_data_folder_says_where_another_is_chosen(
-    shell: Shell,
-) -> None:
-    def reported() -> str:
-        return shell.window.words()[0]
-
-    way = "Choose the data folder at Set up station or in the options (F10)."
-    shell.window.set_unwritable("/data", "Nothing can be kept in /data.")
-    assert reported() == f"Nothing can be kept in /data. {way}"
-    shell.notifications.notify(
-        "The archive /data/a is not there.", "The archive /data/a is not there."
-    )
-    assert reported() == f"Nothing can be kept in /data. {way}"
-    shell.notifications.notify("The camera is lost.", "The camera is lost.")
-    assert reported() == "The camera is lost."
-    shell.notifications.notify(
-        "The archive /data/a is not there.", "The archive /data/a is not there."
-    )
-    assert reported() == f"The archive /data/a is not there. {way}"
-
-    shell.window.set_unwritable("", "")
-    shell.notifications.notify(
-        "The archive /data/a is not there.", "The archive /data/a is not there."
-    )
-    assert reported() == "The archive /data/a is not there."
-
-
 def test_the_present_step_is_always_in_view(qtbot: QtBot, settings: Settings) -> None:
     names = "Start", "Camera", "LEDs", "Swing", "Review", "Verify", "History"
     pages = [Leaf(name) for name in names]
@@ -720,7 +693,8 @@ def test_pages_made_later_come_before_the_main_button_for_the_tab_key(
 ) -> None:
     first, second = Leaf("Start"), Leaf("Camera")
     window = MainWindow(
-        [first], settings, Preferences(), Notifications(), later=iter([second])
+        *([first], settings, Preferences(), Notifications(), iter([second])),
+        lambda: ("Start", "Camera"),
     )
     qtbot.addWidget(window)
     with qtbot.waitSignal(window.completed):

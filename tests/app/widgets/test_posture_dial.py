@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -13,13 +13,11 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.model.coverage import measure_coverage
 from lightpen.model.rigid import Posture, posture_of, rotations_of
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
-from lightpen_app.widgets import posture_dial
 from lightpen_app.widgets.posture_dial import (
     BAR_SHARE,
     DialValue,
     PostureDial,
     field_of,
-    legend_box,
     place_of,
 )
 from lightpen_extensions.simulator.scenes import eight_led_pen
@@ -173,47 +171,6 @@ def test_the_camera_is_drawn_where_it_stands(dial: PostureDial) -> None:
     for heading, y in ((0.0, -1.085), (math.pi, 1.085)):
         dial.set_value(DialValue(needed=WANTED, heading=heading))
         assert color_at(seen(dial), 0.0, y) == QColor(DARK.muted).name()
-
-
-@pytest.mark.parametrize("side", [240, 400])
-@pytest.mark.parametrize("eighths", range(1, 8))
-def test_the_camera_is_named_from_whichever_side_it_looks(
-    qtbot: QtBot, side: int, eighths: int
-) -> None:
-    """As much is drawn of mark and word as where they have the most room."""
-    dial = PostureDial()
-    qtbot.addWidget(dial)
-    dial.resize(side, side + 60)
-    wanted = n_muted(seen(dial))
-
-    dial.set_value(DialValue(heading=eighths * math.pi / 4))
-
-    # Words that are turned are shaded otherwise, by 2 %; the word is a quarter of all.
-    assert n_muted(seen(dial)) == pytest.approx(wanted, rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("width", "letters"), [(200, 13.0), (470, 32.0)]
-)  # of a small window, and of the operator view
-def test_a_large_legend_leaves_the_fields_alone(
-    dial: PostureDial, monkeypatch: pytest.MonkeyPatch, width: int, letters: float
-) -> None:
-    drawn: list[tuple[QRectF, QPointF, float]] = []
-
-    def box_of(text: str, size: float, middle: QPointF, rim: float) -> QRectF:
-        drawn.append((legend_box(text, size, middle, rim), middle, rim))
-        return drawn[-1][0]
-
-    monkeypatch.setattr(posture_dial, "legend_box", box_of)
-    dial.resize(width, 6 * width // 5)
-    dial.set_least_letters(letters)
-    dial.set_value(DialValue(needed=WANTED))
-    seen(dial)
-
-    box, middle, rim = drawn[-1]
-    corner = box.bottomRight() - middle
-    assert box.left() >= 0
-    assert math.hypot(corner.x(), corner.y()) >= rim - 1
 
 
 def test_the_fields_are_drawn_anew_for_what_else_changes_them(

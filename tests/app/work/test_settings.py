@@ -90,15 +90,15 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
     assert settings.station("new").limits.max_uncertainty == 0.02
     assert settings.machine_limits().verification.tip == 0.05
     assert settings.machine_limits().due.max_days == 14
-    assert settings.laboratory() == Laboratory(name="Works 2", procedure="WI-0815")
+    assert settings.last().laboratory == Laboratory(name="Works 2", procedure="WI-0815")
 
     own = Laboratory(name="Hall 3", procedure="WI-1")
-    settings.set_laboratory(own)
+    settings.set_last(laboratory=own)
     settings.set_preferences(replace(settings.preferences(), language="en"))
     settings.set_station("new", STATION)
     assert reopened(settings).preferences().language == "en"
     assert reopened(settings).station("new") == STATION
-    assert reopened(settings).laboratory() == own
+    assert reopened(settings).last().laboratory == own
     assert machine.read_bytes() == before
 
 
@@ -125,13 +125,13 @@ def test_wrong_settings_of_the_administrator_are_reported_and_left_out(
 def test_the_last_station_survives_whatever_its_name(
     settings: Settings, name: str
 ) -> None:
-    assert settings.last_station() == ""
+    assert settings.last().station == ""
     settings.set_station(name, Station(Names(operator=name)))
-    settings.set_last_station(name)
+    settings.set_last(station=name)
 
     again = reopened(settings)
 
-    assert again.last_station() == name
+    assert again.last().station == name
     assert again.stations() == (name,)
     assert again.station(name).names.operator == name
 
@@ -189,7 +189,7 @@ def test_a_file_damaged_meanwhile_costs_nothing_that_is_known(
     settings.file.write_bytes(b"{")
 
     with qtbot.waitSignal(settings.failed) as reported:
-        settings.set_last_station("Hall 3")
+        settings.set_last(station="Hall 3")
 
     assert ". Restore them from a copy, or enter the settings again." in str(
         reported.args[0]
@@ -205,17 +205,17 @@ def test_a_pipe_in_place_of_the_file_is_reported_and_waited_for_by_nobody(
 
     again = Settings(settings.file)
     with qtbot.waitSignal(again.failed):
-        again.set_last_station("Hall 3")
+        again.set_last(station="Hall 3")
 
     assert "is a pipe or a device" in str(again.fault)
-    assert again.last_station() == "Hall 3"
+    assert again.last().station == "Hall 3"
     assert again.await_saved(TIMEOUT)
 
 
 def test_two_windows_keep_what_each_has_changed(settings: Settings) -> None:
     other = Settings(settings.file)
     settings.set_station("Hall 3", STATION)
-    settings.set_last_station("Hall 3")
+    settings.set_last(station="Hall 3")
     assert settings.await_saved(TIMEOUT)
     other.set_station("Hall 4", ANN)
     other.set_preferences(PREFERENCES)
@@ -224,7 +224,7 @@ def test_two_windows_keep_what_each_has_changed(settings: Settings) -> None:
 
     assert again.stations() == ("Hall 3", "Hall 4")
     assert again.station("Hall 3") == STATION
-    assert again.last_station() == "Hall 3"
+    assert again.last().station == "Hall 3"
     assert again.preferences() == PREFERENCES
 
 
@@ -256,11 +256,11 @@ def test_what_is_set_many_times_in_a_row_is_on_the_disk_as_it_was_last(
 ) -> None:
     for n in range(20):
         settings.set_station("Hall 3", replace(STATION, names=Names(pen=f"LP-{n}")))
-        settings.set_last_station(f"Hall {n}")
+        settings.set_last(station=f"Hall {n}")
     assert settings.await_saved(TIMEOUT)
 
     again = Settings(settings.file)
-    assert (again.station("Hall 3").names.pen, again.last_station()) == (
+    assert (again.station("Hall 3").names.pen, again.last().station) == (
         "LP-19",
         "Hall 19",
     )

@@ -110,7 +110,7 @@ class CameraPage(Page):
         self._is_shown = False
         self._adjusting.end_adjustment()
         self._show_camera(0)
-        self._mask.end()
+        self._view.stray_light.give_up()
 
     @override
     def shut_down(self) -> None:
@@ -187,8 +187,6 @@ class CameraPage(Page):
     def _on_connection_changed(self, connection: Connection) -> None:
         if connection is Connection.LOST:
             self._on_lost()
-        if connection is Connection.OPENING:
-            self._view.stray_light.uncover()  # another operator holds the pen
         if connection is not Connection.STREAMING:
             self._adjusting.end_adjustment()
             self._view.exposure.set_value(Exposure())
@@ -214,7 +212,6 @@ class CameraPage(Page):
         for camera, panel in enumerate((self._view.source, self._view.second.source)):
             panel.set_faulty(self._live.has_failed(camera))
         self._view.stray_light.set_live(is_live)
-        self._view.stray_light.set_has_operator(self._live.operator is not None)
         caps = self._live.caps if is_live else None
         source = self._selection.preparation.source
         is_camera = is_live and source.kind != SourceKind.RECORDED  # else a folder

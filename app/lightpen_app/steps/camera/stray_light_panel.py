@@ -10,7 +10,6 @@ from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
-from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
@@ -27,8 +26,6 @@ class StrayLightPanel(Translated, QGroupBox):
     # array: circles (M, 3) to leave out besides those that are: x, y and radius, px
     mask_requested = Signal(object)
     clear_requested = Signal()  # leave nothing out any more
-    # The simulated operator is to cover the LEDs, or to uncover them.
-    cover_requested = Signal(bool)
 
     def __init__(self) -> None:
         super().__init__()
@@ -44,7 +41,6 @@ class StrayLightPanel(Translated, QGroupBox):
             text_label(TextSize.BODY),
             self.tr("Cover the pen, then search for stray light."),
         )
-        self._cover = PushButton(checkable=True)
         self._start = self.make_button(self.tr("Search"), self._on_start_clicked)
         self._mask = PushButton()
         self._clear = self.make_button(self.tr("Clear mask"), self.clear_requested)
@@ -54,7 +50,6 @@ class StrayLightPanel(Translated, QGroupBox):
         layout = vertical_layout(self, self._task)
         buttons = grid_layout(layout)
         buttons.addWidget(self._start, 0, 0)
-        buttons.addWidget(self._cover, 0, 1)
         buttons.addWidget(self._mask, 1, 0)
         buttons.addWidget(self._clear, 1, 1)
         buttons.setColumnStretch(0, 1)
@@ -62,7 +57,6 @@ class StrayLightPanel(Translated, QGroupBox):
         layout.addWidget(self._outcome)
 
         # Connections
-        self._cover.toggled.connect(self._on_cover_toggled)
         self._mask.clicked.connect(self._on_mask_clicked)
 
         self._retranslate()
@@ -90,14 +84,6 @@ class StrayLightPanel(Translated, QGroupBox):
             self.give_up()
         self._refresh()
 
-    def set_has_operator(self, has_operator: bool) -> None:
-        """Offer that the simulated operator covers the LEDs, or not."""
-        self._cover.setVisible(has_operator)
-
-    def uncover(self) -> None:
-        """Let the simulated operator uncover the LEDs, if he covers them."""
-        self._cover.setChecked(False)
-
     def feed(self, seen: LiveImage) -> None:
         """Pass an image to the search, if one is in progress."""
         search = self._search
@@ -122,10 +108,6 @@ class StrayLightPanel(Translated, QGroupBox):
             self._found = circles
             self.found_changed.emit()
 
-    def _on_cover_toggled(self, covers: bool) -> None:
-        self._refresh()
-        self.cover_requested.emit(covers)
-
     def _on_start_clicked(self) -> None:
         self.give_up()
         self._search = StraySearch()
@@ -141,11 +123,6 @@ class StrayLightPanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         n_found = len(self._found)
-        covers = self._cover.isChecked()
-        self._cover.setText(
-            self.tr("Uncover the LEDs") if covers else self.tr("Cover the LEDs")
-        )
-        set_tooltip(self._cover, self.tr("Done by the simulated operator"))
         self._mask.setText(
             self.tr("Mask the spots: {0}").format(n_found)
             if n_found
@@ -217,7 +194,6 @@ class MaskControl(QObject):
         panel.found_changed.connect(self.show_mask)
         panel.mask_requested.connect(self._on_mask_requested)
         panel.clear_requested.connect(self._on_clear_requested)
-        panel.cover_requested.connect(self._on_cover_requested)
 
     def show_mask(self) -> None:
         """Show masked circles and the stray light found."""
@@ -225,11 +201,6 @@ class MaskControl(QObject):
         masked = mask_markers(self._mask)
         found = stray_markers(self._panel.found(), self.tr("stray"))
         self._images.set_extra_markers((*masked, *found))
-
-    def end(self) -> None:
-        """End searching, as the step is left."""
-        self._panel.give_up()
-        self._panel.uncover()
 
     @property
     def _mask(self) -> FloatArray:
@@ -245,7 +216,3 @@ class MaskControl(QObject):
 
     def _on_clear_requested(self) -> None:
         self._set_mask(np.zeros((0, 3)))
-
-    def _on_cover_requested(self, covers: bool) -> None:
-        if operator := self._live.operator:
-            (operator.cover if covers else operator.uncover)()

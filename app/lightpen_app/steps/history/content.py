@@ -110,7 +110,7 @@ class HistoryContent(Translated, QWidget):
 
         workbench.selection.changed.connect(self._on_workbench_changed)
 
-        self.table.set_hidden_columns(self._settings.hidden_columns())
+        self.table.set_hidden_columns(self._settings.last().hidden_columns)
 
     def check_result(self) -> ArchiveCheckResult | None:
         """Return the result of the last archive check."""
@@ -147,7 +147,7 @@ class HistoryContent(Translated, QWidget):
         self._read_due()
 
     def _on_columns_changed(self) -> None:
-        self._settings.set_hidden_columns(self.table.hidden_columns())
+        self._settings.set_last(hidden_columns=self.table.hidden_columns())
 
     def _on_selection_changed(self) -> None:
         line = self.table.current()

@@ -3,19 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
-from typing_extensions import override
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.cameras.protocol import Connection
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.pen_check.match import PenMatch, add_view, match_pen
-from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.steps.leds.file_panel import LedFileControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
-from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
-from lightpen_app.widgets.controls import PushButton
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection
@@ -198,59 +194,3 @@ class MatchControl(QObject):
 def _differ(swung: Pen, pen: Pen | None) -> bool:
     """Return whether the LEDs of a file differ from the LEDs of the swing."""
     return pen is None or not np.array_equal(swung.leds, pen.leds)
-
-
-COVERED = (1, 2, 3)  # LEDs
-COVER_S = 3.0
-
-
-class LedSimulatorControls(SimulatorControls):
-    """Has the simulated operator show the pen; hidden with a real one."""
-
-    def __init__(self, live: LiveView) -> None:
-        super().__init__(live)
-
-        # Widgets
-        self._lean = PushButton(checkable=True)
-        self._cover = PushButton()
-
-        # Layout
-        horizontal_layout(self, (self._lean, 1), (self._cover, 1))
-        for button in (self._lean, self._cover):
-            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-
-        # Connections
-        self._lean.toggled.connect(self._on_lean_toggled)
-        self._cover.clicked.connect(self._on_cover_clicked)
-
-        self._retranslate()
-        self._follow_connection()
-
-    def rest(self) -> None:
-        """Let the pen be held still."""
-        self._lean.setChecked(False)
-
-    @override
-    def _follow_connection(self) -> None:
-        super()._follow_connection()
-        if self._live.operator is None:
-            self.rest()
-
-    def _on_lean_toggled(self, leans: bool) -> None:
-        self._command(lambda hand: hand.swing() if leans else hand.hold())
-
-    def _on_cover_clicked(self) -> None:
-        self._command(lambda operator: operator.cover(COVER_S, COVERED))
-
-    @override
-    def _retranslate(self) -> None:
-        set_words(
-            self._lean,
-            self.tr("Tilt pen"),
-            self.tr("Tilts the simulated pen to all sides until switched off"),
-        )
-        set_words(
-            self._cover,
-            self.tr("Cover LEDs"),
-            self.tr("Covers three LEDs of the simulated pen"),
-        )

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGroupBox, QWidget
+from PySide6.QtWidgets import QGroupBox
 from typing_extensions import override
 
 from lightpen.detection.pen_detection import PenDetection
@@ -37,7 +37,7 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs and the match of each."""
 
-    def __init__(self, foot: QWidget) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.say(self, self.tr("Live match"))
         self._match: PenMatch | None = None
@@ -59,7 +59,7 @@ class MatchPanel(Translated, QGroupBox):
         self._messages = tuple(SignLabel() for _ in range(N_FINDINGS))
 
         # Layout
-        vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0, foot)
+        vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0)
 
         self._retranslate()
 

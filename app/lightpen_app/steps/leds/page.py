@@ -15,7 +15,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
-from lightpen_app.steps.leds.match_control import LedSimulatorControls, MatchControl
+from lightpen_app.steps.leds.match_control import MatchControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.widgets.controls import PushButton
@@ -67,8 +67,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._file = LedFilePanel(can_discover=can_discover(services))
         self._leds = LedTablePanel()
         self._space = FramePanel()
-        self._simulator = LedSimulatorControls(workbench.live)
-        self._match = MatchPanel(self._simulator)
+        self._match = MatchPanel()
 
         self._pens = workbench.pens
         self._files = LedFileControl(self._selection, workbench.pens, self._file)
@@ -147,7 +146,6 @@ class LedsPage(ResponsiveLayout, Page):
     @override
     def left(self) -> None:
         self._matching.stop()
-        self._simulator.rest()
 
     @override
     def shut_down(self) -> None:

@@ -16,10 +16,10 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen_app.look.layouts import vertical_layout
+from lightpen_app.look.signs import Sign, sign_icon
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import number_text, set_tooltip
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.state_banner import StatusMessage, message_icon
 from lightpen_app.widgets.tables import RIGHT
 
 NORMALS = (4, 5, 6)  # columns; before them are number and coordinates
@@ -83,7 +83,7 @@ class LedTable(Translated, QTableWidget):
             self._set(row, MISFIT, "" if misfit is None else f"{misfit:.3f}")
             number = self._set(row, 0, str(row + 1), Qt.AlignmentFlag.AlignCenter)
             number.setToolTip(reason)
-            sign = message_icon(StatusMessage.warning(reason), self) if reason else None
+            sign = sign_icon(self, Sign.WARNING, Tone.WARN) if reason else None
             number.setData(Qt.ItemDataRole.DecorationRole, sign)
 
     def chosen(self) -> int:

@@ -5,7 +5,7 @@ from PySide6.QtCore import QObject
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.acceptance import takes_supervisor
 from lightpen_app.steps.review.view import ReviewView
-from lightpen_app.steps.review.view_state import repeat_question, take_back_question
+from lightpen_app.steps.review.view_state import repeat_question
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
 
@@ -44,12 +44,10 @@ class AcceptanceControl(QObject):
         self._runner.ask(lambda workflow: workflow.discard())
 
     def _ask_to_take_back(self) -> None:
-        if self._selection.supervision.is_guarded:
-            self._view.withdrawal.ask(of_supervisor=True)
-        else:
-            self._view.question.ask_about(take_back_question, self._withdraw)
+        is_guarded = self._selection.supervision.is_guarded
+        self._view.withdrawal.ask(of_supervisor=is_guarded)
 
-    def _withdraw(self, reason: str = "", signature: Signature | None = None) -> None:
+    def _withdraw(self, reason: str, signature: Signature | None) -> None:
         result = self._run.status.result
         if result is not None:
             operator = self._selection.preparation.names.operator

@@ -1,26 +1,17 @@
 """Opens the folder of a result, copies the tip, exports and prints the result."""
 
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import (
-    QApplication,
-    QComboBox,
-    QDialog,
-    QDialogButtonBox,
-    QFileDialog,
-    QLineEdit,
-    QMenu,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QWidget
 
 from lightpen.archive.logbook import with_entry
 from lightpen.estimation.reports.report_warnings import reported
 from lightpen.local_time import local_now
-from lightpen.model.names import PLACES, Laboratory, is_country
+from lightpen.model.names import Laboratory
 from lightpen.record.calibrations import read_calibration, with_status
 from lightpen.record.exports import (
     TABLE_FORMATS,
@@ -31,88 +22,13 @@ from lightpen.record.exports import (
 )
 from lightpen_app.face import Services, report_printer
 from lightpen_app.look.languages import listed, worded
-from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.words import set_tooltip
 from lightpen_app.widgets.controls import open_folder
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.swing_run import SwingRun
-
-LONGEST = 200  # characters
-N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
-
-
-class LaboratoryDialog(FittedWindow, Translated, QDialog):
-    """Dialog for the laboratory; name, e-mail, city and country are required."""
-
-    given = Signal(object)  # Laboratory
-
-    def __init__(self, known: Laboratory | None, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.say(self, self.tr("Calibration laboratory"))
-
-        # Widgets
-        self._edits = [QLineEdit() for _ in range(N_FIELDS)]
-        places = (
-            self.tr("Laboratory"),
-            self.tr("Customer"),
-            self.tr("Branch of the laboratory"),
-            self.tr("Branch of the customer"),
-            self.tr("Elsewhere"),
-        )
-        self._place = self.say_items(QComboBox(), places)
-        texts = (
-            self.tr("Name"),
-            self.tr("E-mail address"),
-            self.tr("City"),
-            self.tr("Country code, two capital letters such as DE"),
-            self.tr("Street (optional)"),
-            self.tr("Post code (optional)"),
-            self.tr("Procedure (optional)"),
-            self.tr("Place of calibration"),
-        )
-        standard = QDialogButtonBox.StandardButton
-        self._buttons = QDialogButtonBox(standard.Ok | standard.Cancel)
-        self.say(self._buttons.button(standard.Ok), self.tr("Save..."))
-        self.say(self._buttons.button(standard.Cancel), self.tr("Cancel"))
-
-        # Layout
-        layout = vertical_layout(self, spacing=2 * GRID, margins=3 * GRID)
-        grid = grid_layout(layout, spacing=(2 * GRID, 2 * GRID))
-        fields = zip((*self._edits, self._place), texts, strict=True)
-        for i, (field, text) in enumerate(fields):
-            self.make_field(grid, field, text, at=divmod(i, 2))
-        layout.addWidget(self._buttons)
-        self.setMinimumWidth(72 * GRID)
-
-        # Connections
-        for edit in self._edits:
-            edit.setMaxLength(LONGEST)
-            edit.textChanged.connect(self._refresh)
-        self._buttons.accepted.connect(self._on_accepted)
-        self._buttons.rejected.connect(self.reject)
-
-        if known is not None:
-            *given, place = astuple(known)
-            for edit, text in zip(self._edits, given, strict=True):
-                edit.setText(text)
-            self._place.setCurrentIndex(PLACES.index(place) if place in PLACES else 0)
-        self._refresh()
-
-    def _refresh(self) -> None:
-        texts = [edit.text().strip() for edit in self._edits[:N_NEEDED]]
-        ok = self._buttons.button(QDialogButtonBox.StandardButton.Ok)
-        ok.setEnabled(all(texts) and is_country(texts[-1]))
-
-    def _on_accepted(self) -> None:
-        texts = (edit.text().strip() for edit in self._edits)
-        place = PLACES[self._place.currentIndex()]
-        self.given.emit(replace(Laboratory(*texts), place=place))
-        self.accept()
-
 
 TABLES = TABLE_FORMATS[:3]  # without the text that is pasted
 
@@ -219,7 +135,7 @@ class ResultExport(QObject):
         super().__init__(page)
         self._run = run
         self._place = place
-        self._page = page
+        self._page, self._services = page, services
         self._saving: Job | None = None
         self._print_report = report_printer(services, place, page)
 
@@ -255,15 +171,12 @@ class ResultExport(QObject):
             self.message_sent.emit(self.tr("Tip copied: x, y, z in mm."))
 
     def _ask_laboratory(self, export: tuple[ExportFormat, ...]) -> None:
-        """Ask for the laboratory where a format names it, then for the folder."""
+        """Have the laboratory asked for where a format names it, then the folder."""
         if not any(each.needs_laboratory for each in export):
             self._ask_folder(export, None)
             return
-        dialog = LaboratoryDialog(self._place.settings.laboratory(), self._page)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.given.connect(self._place.settings.set_laboratory)
-        dialog.given.connect(lambda laboratory: self._ask_folder(export, laboratory))
-        dialog.open()
+        (named,) = (s for s in self._services if {*s.export_formats()} & {*export})
+        named.ask_laboratory(self._page, partial(self._ask_folder, export))
 
     def _ask_folder(
         self, export: tuple[ExportFormat, ...], laboratory: Laboratory | None

@@ -183,19 +183,6 @@ def repeat_question() -> Question:
     )
 
 
-def take_back_question() -> Question:
-    """Return whether to take an acceptance back."""
-    return Question(
-        translate(
-            "ReviewPage",
-            "Revoke this acceptance? The previous result becomes current again. "
-            "Both stay in the archive.",
-        ),
-        translate("ReviewPage", "Revoke acceptance"),
-        translate("ReviewPage", "Keep acceptance"),
-    )
-
-
 def review_state(status: SwingStatus) -> State:
     """Return the banner: verdict, or since when the tip is current."""
     if status.result is not None:

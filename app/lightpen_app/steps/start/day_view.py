@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, QModelIndex, Signal
-from PySide6.QtGui import QColor, QIcon, QKeyEvent, QStandardItem, QStandardItemModel
+from PySide6.QtCore import QModelIndex, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
 
@@ -29,7 +29,7 @@ from lightpen_app.steps.start.day_state import TipRow
 from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
 from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.widgets.number_field import NumberField, is_refusing
-from lightpen_app.widgets.state_banner import SignLabel, StatusMessage, message_icon
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import RIGHT, RowTable
 
 
@@ -89,23 +89,11 @@ class ReadinessLine(QFrame):
         ):
             text = item.name if item.is_amber else item.message.text
             button.setText(text)
-            button.setIcon(message_icon(item.message, self))
+            button.set_mark(item.message.sign, item.message.tone)
             button.setAccessibleDescription(item.message.text)
             set_tooltip(button, item.message.text if item.is_amber else "")
             set_tone(button, item.message.tone)
             reason.set_value(item.message if item.is_amber else StatusMessage())
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._restyle()
-
-    def _restyle(self) -> None:
-        """Draw the signs in the present colours."""
-        for item, button in zip(self._items, self._buttons, strict=False):
-            icon = message_icon(item.message, self) if item.message.text else QIcon()
-            button.setIcon(icon)
 
     def _on_clicked(self, index: int) -> None:
         if index < len(self._items):

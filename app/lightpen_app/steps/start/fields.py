@@ -11,12 +11,13 @@ from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.signs import sign_icon
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
 from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
 from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.state_banner import StatusMessage, message_icon
+from lightpen_app.widgets.state_banner import StatusMessage
 
 NO_REMARK = StatusMessage()
 
@@ -64,7 +65,7 @@ class ItemButton(Translated, PushButton):
             text = shortened(choice.name).replace("&", "&&")
             word = choice.remark.text
             action = menu.addAction(f"{text}\t{word}" if word else text)
-            action.setIcon(message_icon(choice.remark, self))
+            action.setIcon(sign_icon(self, choice.remark.sign, choice.remark.tone))
             action.triggered.connect(
                 lambda _=False, name=choice.name: self.chosen.emit(name)
             )

@@ -18,7 +18,7 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, moment_text, shortened
-from lightpen_app.widgets.bars import Question, QuestionBar, WithdrawalBar
+from lightpen_app.widgets.bars import WithdrawalBar
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import SizeClass
 from lightpen_app.widgets.state_banner import (
@@ -86,8 +86,6 @@ class LastResultPanel(Translated, QGroupBox):
                 "Reinstate the previous result. Both results stay in the archive."
             ),
         )
-        self._question = QuestionBar()
-        self._question.set_words(self._taking_back)
         self._withdrawal = WithdrawalBar()
         self._is_guarded = False
 
@@ -99,13 +97,11 @@ class LastResultPanel(Translated, QGroupBox):
         fill(layout, self._when, self._table, self._origin, self._reason)
         fill(layout, self._warning)
         horizontal_layout(layout, self._verify, self._take_back, 1)
-        fill(layout, self._question, self._withdrawal)
+        fill(layout, self._withdrawal)
 
         # Connections
-        self._withdrawal.given.connect(self._on_signed)
+        self._withdrawal.given.connect(self._on_given)
         self._withdrawal.declined.connect(self._take_back.setFocus)
-        self._question.agreed.connect(self._on_agreed)
-        self._question.declined.connect(self._take_back.setFocus)
 
         self._retranslate()
 
@@ -119,7 +115,7 @@ class LastResultPanel(Translated, QGroupBox):
     def set_value(self, value: LastResult) -> None:
         """Show another result, or why there is none."""
         self._value = value
-        self._question.hide()
+        self._withdrawal.hide()
         self._retranslate()
 
     def set_rule(self, rule: DueRule) -> None:
@@ -178,15 +174,6 @@ class LastResultPanel(Translated, QGroupBox):
                 hint=self.tr("Select a pen and a tip to see the last calibration.")
             )
 
-    def _taking_back(self) -> Question:
-        return Question(
-            self.tr(
-                "Revoke this acceptance? The previous result becomes current again."
-            ),
-            self.tr("Revoke acceptance"),
-            self.tr("Keep acceptance"),
-        )
-
     def _say(self, short: str = "", hint: str = "", fault: str = "") -> None:
         """Say why there is no result."""
         self._age.setText(short)
@@ -233,15 +220,9 @@ class LastResultPanel(Translated, QGroupBox):
         self._is_guarded = is_guarded
 
     def _ask_to_take_back(self) -> None:
-        if self._is_guarded:
-            self._withdrawal.ask(of_supervisor=True)
-        else:
-            self._question.ask()
+        self._withdrawal.ask(of_supervisor=self._is_guarded)
 
-    def _on_agreed(self) -> None:
-        self.take_back_requested.emit(self._value.result, "", None)
-
-    def _on_signed(self, reason: str, signature: Signature) -> None:
+    def _on_given(self, reason: str, signature: Signature | None) -> None:
         self.take_back_requested.emit(self._value.result, reason, signature)
 
     def _warning_of(self, result: Result, now: datetime) -> StatusMessage:

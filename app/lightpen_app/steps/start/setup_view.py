@@ -1,13 +1,13 @@
 """The first view of a new user, and the set-up of a station."""
 
 import math
-from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import TypeAlias
+from string import Template
 
 import numpy as np
-from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QObject, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -20,22 +20,19 @@ from lightpen_app.look.layouts import (
     set_stacked,
     vertical_layout,
 )
-from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.signs import draw_svg
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import breakable
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.controls import PushButton, open_folder
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.pen_in_space import (
-    DisplayedPosture,
-    PenInSpace,
-    body_outline,
-    seen_from_behind,
-)
+from lightpen_app.widgets.pen_in_space import DisplayedPosture, PenInSpace
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.selection import TRIAL, is_trial_ready
 from lightpen_app.work.workbench import Workbench
+from lightpen_resources import RESOURCES
 
 
 class DataFolderPanel(Translated, QGroupBox):
@@ -177,7 +174,6 @@ COLUMNS = (0, (0, 60, 120, 180), -30), (-25, (20, 90, 160), 0), (25, (35, 105, 1
 LEDS = np.array([(x, y, z) for x, column, z in COLUMNS for y in column], np.float64)
 PEN = Pen(LEDS, np.tile([0.0, 0.0, 1.0], (len(LEDS), 1)))
 SHOWN = DisplayedPosture(PEN, np.array([0.0, -90.0, -25.0]), LEANING, RIGHT)
-Draw: TypeAlias = Callable[[QPainter, QRectF, Colors], None]
 
 
 class WelcomeView(Translated, QWidget):
@@ -194,8 +190,8 @@ class WelcomeView(Translated, QWidget):
         pen = PenInSpace()
         pen.set_value(SHOWN)
         self.trial = _Card(pen)
-        self._images = _Card(_Drawing(_draw_images))
-        self._station = _Card(_Drawing(_draw_station))
+        self._images = _Card(_Drawing("images"))
+        self._station = _Card(_Drawing("station"))
 
         # Layout
         layout = vertical_layout(self)
@@ -281,67 +277,16 @@ class _Card(PushButton):
 class _Drawing(QWidget):
     """A picture drawn in the colours of the window."""
 
-    def __init__(self, draw: Draw) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
-        self._draw = draw
+        file = RESOURCES / "pictures" / f"{name}.svg"
+        self._picture = Template(file.read_text("utf-8"))
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self._draw(painter, QRectF(self.rect()), colors_of(self.palette()))
-
-
-def _draw_images(painter: QPainter, box: QRectF, colors: Colors) -> None:
-    """Draw a pile of three images with the LEDs of the pen."""
-    size = 0.66 * min(box.width() / 1.3, box.height())
-    frame = QRectF(0.0, 0.0, 1.3 * size, size)
-    frame.moveCenter(box.center())
-    for step in (-1, 0, 1):
-        image = frame.translated(0.14 * size * step, 0.14 * size * step)
-        painter.setPen(QPen(QColor(colors.raised), 2))
-        painter.setBrush(QColor(colors.muted))
-        painter.drawRect(image)
-    _draw_leds(painter, image, colors.raised)
-
-
-def _draw_station(painter: QPainter, box: QRectF, colors: Colors) -> None:
-    """Draw a camera on its stand that sees the LEDs of the pen."""
-    size = min(box.width() / 2.2, box.height())
-    center = box.center()
-    camera = QRectF(center.x() - size, center.y() - 0.3 * size, 0.42 * size, 0.3 * size)
-    lens = QPointF(camera.right() + 0.08 * size, camera.center().y())
-    pen = QRectF(center.x() + 0.15 * size, box.top(), 0.8 * size, box.height())
-    painter.setPen(QPen(QColor(colors.muted), 0.04 * size))
-    for foot in (-0.2, 0.0, 0.2):
-        bottom = QPointF(camera.center().x() + foot * size, center.y() + 0.45 * size)
-        painter.drawLine(QPointF(camera.center().x(), camera.bottom()), bottom)
-    painter.setPen(QPen(QColor(colors.edge), 1, Qt.PenStyle.DashLine))
-    for corner in (pen.topLeft(), pen.bottomLeft()):
-        painter.drawLine(lens, corner + QPointF(0.2 * size, 0.0))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(colors.muted))
-    painter.drawRoundedRect(camera, 4, 4)
-    painter.drawEllipse(lens, 0.1 * size, 0.12 * size)
-    _draw_leds(painter, pen, colors.raised, body=colors.muted)
-
-
-def _draw_leds(painter: QPainter, box: QRectF, color: str, body: str = "") -> None:
-    """Draw the LEDs of the pen in the middle of a box, and its body in a colour."""
-    leds = seen_from_behind(SHOWN, LEANING) * (1, -1)
-    middle, extent = (leds.max(axis=0) + leds.min(axis=0)) / 2, np.ptp(leds, axis=0)
-    scale = 0.7 * float(min(np.array([box.width(), box.height()]) / extent))
-    leds = (leds - middle) * scale + box.center().toTuple()
-    if body:
-        pen = QPen(QColor(body), 14)
-        pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
-        painter.setPen(pen)
-        painter.setBrush(QColor(body))
-        painter.drawPolygon(body_outline(leds))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(color))
-    for x, y in leds.tolist():
-        painter.drawEllipse(QPointF(x, y), 4, 4)
+        colors = asdict(colors_of(self.palette()))
+        with QPainter(self) as painter:
+            draw_svg(painter, QRectF(self.rect()), self._picture.substitute(colors))
 
 
 class WelcomeControl(QObject):

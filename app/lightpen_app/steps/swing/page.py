@@ -8,7 +8,7 @@ from lightpen.cameras.protocol import Connection
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.preparation import SourceKind
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_app.face import Services
+from lightpen_app.face import Services, swing_controls
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds
@@ -25,7 +25,6 @@ from lightpen_app.steps.swing.page_state import (
     start_over_question,
     unsaved_swing_text,
 )
-from lightpen_app.steps.swing.simulator_controls import SwingSimulatorControls
 from lightpen_app.steps.swing.view import SwingView
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.page import MainAction, Page
@@ -56,7 +55,7 @@ class SwingPage(Page):
 
         # Widgets
         self._view = SwingView(self)
-        self._simulator = SwingSimulatorControls(self._live, self)
+        self._simulator = swing_controls(services, self._live)
         self._question = QuestionBar()
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
         self._plotting = QTimer(self, interval=PLOTTING_MS)

@@ -34,6 +34,7 @@ from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.rig_files import write_camera
 from lightpen.live.pipeline import LiveImage
+from lightpen.live.sources import Operator
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
@@ -112,6 +113,13 @@ def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> FaultyCamera:
     camera = FaultyCamera(scene, clock, lamps=lamps)
     workbench.live.open([camera], CameraSettings(), clock)
     return camera
+
+
+def operator_of(workbench: Workbench) -> Operator:
+    """Return the simulated operator in view."""
+    operator = workbench.live.operator
+    assert operator is not None
+    return operator
 
 
 def recording(
@@ -684,7 +692,7 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen.page.entered()
     seen.wait("10 of 10 LEDs, other spots: 2")
 
-    seen.click("Cover the LEDs")
+    operator_of(workbench).cover()
     seen.wait("too few LEDs")
     seen.click("Search")
     seen.wait("Stray spots: 2.")
@@ -694,7 +702,7 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
 
     seen.click("Mask the spots: 2")
     seen.wait("Masked areas: 2")
-    seen.click("Uncover the LEDs")
+    operator_of(workbench).uncover()
     seen.wait("10 of 10 LEDs")
     seen.until(lambda: not others(seen))
     assert len(crossed(seen)) == 2
@@ -730,7 +738,7 @@ def test_a_mask_adds_to_the_one_before(
     plugged(workbench, small_scene, *LAMPS).operator.leave()
     seen.page.entered()
     seen.wait("Live")
-    seen.click("Cover the LEDs")
+    operator_of(workbench).cover()
     seen.wait("too few LEDs")
 
     seen.click("Search")
@@ -748,8 +756,8 @@ def test_a_pen_that_is_still_seen_is_not_masked(live: "Seen") -> None:
     assert not live.named("Mask the spots").isEnabled()
 
 
-def test_nothing_left_is_reported(live: "Seen") -> None:
-    live.click("Cover the LEDs")
+def test_nothing_left_is_reported(live: "Seen", workbench: Workbench) -> None:
+    operator_of(workbench).cover()
     live.wait("no LED seen")
 
     live.click("Search")
@@ -806,29 +814,6 @@ def test_a_grey_button_says_why(seen: "Seen") -> None:
         "Mask the spots": "No spots to mask",
         "Clear mask": "No mask is set.",
     }
-
-
-def test_the_pen_is_uncovered_when_the_page_is_left(
-    live: "Seen", workbench: Workbench
-) -> None:
-    live.click("Cover the LEDs")
-    live.wait("no LED seen")
-
-    live.page.left()
-    live.page.entered()
-
-    live.wait("10 of 10 LEDs")
-    assert live.named("Cover the LEDs")
-
-
-def test_another_simulated_operator_covers_nothing(live: "Seen") -> None:
-    live.click("Cover the LEDs")
-    live.wait("no LED seen")
-    live.choose("Recorded images")
-    live.choose("Simulated pen")
-
-    live.wait("10 of 10 LEDs")
-    assert live.named("Cover the LEDs")
 
 
 # The step among the others

@@ -248,7 +248,7 @@ def test_a_column_that_is_not_wanted_stays_hidden(desk: Desk) -> None:
     tip.trigger()
 
     assert desk.table.isColumnHidden(TIP)
-    assert desk.workbench.settings.hidden_columns() == (TIP,)
+    assert desk.workbench.settings.last().hidden_columns == (TIP,)
     again = HistoryPage(desk.workbench)
     again.entered()
     (table,) = again.findChildren(HistoryTable)

@@ -1,6 +1,5 @@
 """The step LEDs as an operator sees it: file, table, pen in space and live match."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +28,6 @@ from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
-from lightpen_app.steps.leds.match_control import LedSimulatorControls
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.table_panel import MISFIT, LedTable
@@ -38,7 +36,6 @@ from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.hand import HandActivity
 from lightpen_extensions.simulator.scenes import Scene, fanned_pen, six_led_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
@@ -489,32 +486,6 @@ def test_a_covered_led_is_reported(
 
     seen.wait("LED 6 is not detected at its table position.")
     assert "9 of 10 LEDs" in seen.words
-
-
-@pytest.mark.slow
-def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
-    seen: "Seen",
-    workbench: Workbench,
-    small_scene: Scene,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("lightpen_app.steps.leds.match_control.COVER_S", math.inf)
-    row = seen.child(LedSimulatorControls)
-    assert not row.isVisibleTo(seen.page)
-    camera = FaultyCamera(small_scene, workbench.around.clock)
-    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
-    seen.page.entered()
-    seen.wait("10 of 10 LEDs")
-    assert row.isVisibleTo(seen.page)
-
-    seen.click("Tilt pen")
-    seen.wait("All LEDs fit their table positions")
-    seen.until(lambda: camera.operator.doing is HandActivity.SWINGING)
-    seen.click("Cover LEDs")
-    seen.wait("7 of 10 LEDs")
-
-    seen.page.left()  # the swing finds the pen at rest
-    seen.until(lambda: camera.operator.doing is HandActivity.SEATED)
 
 
 def test_the_file_of_another_pen_is_used_after_a_question_only(

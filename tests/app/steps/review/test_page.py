@@ -66,7 +66,6 @@ from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot, ResidualView
-from lightpen_app.steps.review.result_export import LaboratoryDialog
 from lightpen_app.steps.review.result_panel import (
     ResultPanel,
     StatusMessageList,
@@ -84,6 +83,7 @@ from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
 from lightpen_app_extensions.comparisons.service import ComparisonsService
+from lightpen_app_extensions.exports.laboratory_dialog import LaboratoryDialog
 from lightpen_app_extensions.exports.service import ExportsService
 from lightpen_app_extensions.report.control import PrintReportWindow
 from lightpen_app_extensions.report.service import ReportService
@@ -716,7 +716,9 @@ def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(bed: Bed) ->
     give_reason(page, "New ball mounted.")
     bed.qtbot.waitUntil(page.is_complete)
     click(page, "Revoke acceptance...")
-    answer(page, "Revoke acceptance")
+    edit = the(page, WithdrawalBar).findChildren(QLineEdit)[0]
+    QTest.keyClicks(edit, "Wrong pen.")
+    QTest.keyClick(edit, Qt.Key.Key_Return)
     bed.qtbot.waitUntil(lambda: not page.is_complete())
 
     found = in_force(workbench)
@@ -833,7 +835,7 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     rows = (folder / f"{stem}_images.csv").read_text().splitlines()
     assert len(rows) == N_IMAGES + 1
     assert "live camera" in (folder / f"{stem}_tip.csv").read_text()
-    assert workbench.settings.export_folder() == str(folder)
+    assert workbench.settings.last().export_folder == str(folder)
 
 
 def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
@@ -873,7 +875,7 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
     laboratory = Laboratory(
         *("Hall 2", "a@b.de", "Berlin", "DE"), procedure="WI 7", place="customer"
     )
-    assert workbench.settings.laboratory() == laboratory
+    assert workbench.settings.last().laboratory == laboratory
 
 
 @pytest.mark.slow

@@ -419,7 +419,7 @@ def test_a_known_station_brings_back_all_that_was_chosen_there(
     assert start.text_of("Operator") == "Ann"
     assert start.text_of("Max. images") == "300"
     assert workbench.selection.preparation.names.operator == "Ann"
-    assert settings.last_station() == "Hall 2"
+    assert settings.last().station == "Hall 2"
 
 
 def test_a_new_station_takes_over_the_present_choices(
@@ -436,7 +436,7 @@ def test_a_new_station_takes_over_the_present_choices(
     assert workbench.selection.preparation.source == NO_SOURCE  # it simulated
     assert workbench.selection.stations() == ("Hall 2", "Hall 3")
     assert settings.await_saved(120.0)
-    assert Settings(settings.file).last_station() == "Hall 3"
+    assert Settings(settings.file).last().station == "Hall 3"
 
 
 def test_a_station_is_not_made_of_each_letter_that_is_typed(
@@ -637,6 +637,7 @@ def test_the_last_acceptance_is_taken_back_here_too(
     assert start.last()[0] == "Yesterday"
 
     start.press("Revoke acceptance...")
+    QTest.keyClicks(focused(), "Wrong pen.")
     start.press("Revoke acceptance")
     qtbot.waitUntil(lambda: start.last()[0] == "9 days ago")
     assert len(list(workbench.folder.rglob("results/*.json"))) == 3

@@ -34,6 +34,7 @@ from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.plots import TracePlot
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.simulator.service import SimulatorService
 from lightpen_extensions.simulator.hand import SimulatedOperator
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Desk:
     def __init__(self, workbench: Workbench, settings: Settings) -> None:
         self.workbench, self.run = workbench, workbench.run
         self.recorder = Recorder()
-        self.page = SwingPage(workbench, self.recorder)
+        self.page = SwingPage(workbench, self.recorder, (SimulatorService(workbench),))
         pages = (BlankPage("leds"), self.page, BlankPage("review"))
         self.window = MainWindow(
             pages, settings, Preferences(), workbench.notifications

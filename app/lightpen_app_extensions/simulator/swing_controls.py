@@ -1,13 +1,13 @@
 """Buttons for the simulated operator, where the pen is simulated."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QMenu
 from typing_extensions import override
 
 from lightpen.live.sources import Operator
+from lightpen_app.face import SimulatorControls
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, set_styled
-from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fitting import NO_ROOM, ResponsiveLayout
 from lightpen_app.work.live_view import LiveView
@@ -21,8 +21,8 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
     narrow_below = 100 * GRID  # px; then its buttons are closer together
 
-    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
-        super().__init__(live, parent)
+    def __init__(self, live: LiveView) -> None:
+        super().__init__(live)
         self.setProperty("area", "panel")
         self._room = NO_ROOM  # so that its least size at first widens no window
         self._led: Operator | None = None  # that was set to seat the tip and follow
@@ -85,13 +85,13 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
     def _use_room(self) -> None:
         self._retranslate()
 
+    @override
     def invite(self) -> None:
-        """Let the operator swing, as the button invites to."""
         if self._live.operator is not None and not self.follows():
             self._follow.setChecked(True)
 
+    @override
     def set_inviting(self, inviting: bool) -> None:
-        """Draw the button that swings filled: one button of a page is, at most."""
         set_styled(self._follow, "inviting", "true" if inviting else "")
 
     def follows(self) -> bool:
@@ -100,13 +100,13 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
     @override
     def _retranslate(self) -> None:
-        set_words(
-            self._follow,
+        self._follow.setText(
             self.tr("Simulated swing")
             if self._room.is_narrow
-            else self.tr("Let the simulated operator swing"),
-            self.tr("Seats the tip and follows the arrow automatically"),
+            else self.tr("Let the simulated operator swing")
         )
+        tip = self.tr("Seats the tip and follows the arrow automatically")
+        self._follow.set_why_not("", tip)
 
     @override
     def _follow_connection(self) -> None:
