@@ -165,7 +165,7 @@ class StepList(Translated, QWidget):
         self._layout.setContentsMargins(side, 0, side, 0)
 
     def set_steps(self, steps: Sequence[Step]) -> None:
-        """Show these steps; there are never fewer than before."""
+        """Show these steps; there are no fewer than before."""
         for index in range(len(self._buttons), len(steps)):
             button = StepButton(steps[index])
             button.clicked.connect(lambda _=False, at=index: self.step_chosen.emit(at))
@@ -174,7 +174,7 @@ class StepList(Translated, QWidget):
             self._buttons.append(button)
             self._reasons.append(reason)
             fill(self._layout, button, reason)
-        shown = zip(self._buttons, self._reasons, steps, strict=True)
+        shown = zip(self._buttons, self._reasons, steps, strict=False)
         for button, reason, step in shown:
             button.set_value(step)
             reason.setText(step.why_closed)

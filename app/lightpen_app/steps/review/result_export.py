@@ -175,7 +175,7 @@ class ResultExport(QObject):
         if not any(each.needs_laboratory for each in export):
             self._ask_folder(export, None)
             return
-        (named,) = (s for s in self._services if {*s.export_formats()} & {*export})
+        named = next(s for s in self._services if export[0] in s.export_formats())
         named.ask_laboratory(self._page, partial(self._ask_folder, export))
 
     def _ask_folder(
