@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray
+from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.reports.report_warnings import (
     reported,
     result_of,
@@ -152,7 +153,8 @@ class ResidualsPanel(PlotsPanel):
         points = images.observations.seen_pixels[used]
         residuals = solution.residuals[:, c][used]
         leds = calibration.leds
-        shifts = calibration.bundle.lens_shifts(c)
+        is_found = any(each.name is FieldName.LENS for each in calibration.fields)
+        shifts = calibration.bundle.lens_shifts(c) if is_found else None
         self._lens_card.setVisible(shifts is not None)
         if shifts is not None:
             in_joint: BoolArray = np.any(calibration.joint.used, axis=1)

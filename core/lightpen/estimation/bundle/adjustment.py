@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.bundle.bundle import Bundle, fit_bundle, with_fields
+from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
 from lightpen.estimation.bundle.change_point import ChangePoint, find_step
 from lightpen.estimation.bundle.consistency_findings import (
     ContradictedInputs,
@@ -23,9 +23,7 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.image_fields import (
-    FieldComponent,
     FieldName,
-    ImageField,
     image_fields,
     seat_modes_of,
 )
@@ -40,69 +38,15 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import EXACT, chi_square_quantile, inverse
 from lightpen.model.rigid import of_camera
 
-# Search for fields of the images that improve a fit without them.
-#
-# All are unknowns of one linear step about the fit, with all variance components
-# estimated anew, as others may have absorbed a field. One that the images support is to
-# be fitted. The others are held at 0, and what they may be all the same moves tip and
-# cone by its own covariance.
-
-
-@dataclass(frozen=True, eq=False)
-class SearchedField:
-    """A field beside a fit without it."""
-
-    field: ImageField
-    component: FieldComponent
-    # (6, k), error of the effective (tip, cone) per unknown of the field if it is 0.
-    by_unknowns: FloatArray
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Covariance of (tip, cone) by the possible size of the field, (6, 6)."""
-        G = self.by_unknowns
-        return np.asarray(G @ self.component.covariance @ G.T)
-
-
-def search_fields(bundle: Bundle, pixels: FloatArray) -> tuple[SearchedField, ...]:
-    """Search a fit for fields of the images beside those that it has.
-
-    ``pixels`` (N, C, L, 2) are the LED centres, px.
-    """
-    state, known = bundle.state, bundle.unknowns.fields
-    fitted = {(each.name, each.camera) for each in known}
-    every = image_fields(pixels, bundle.used, state)
-    fields = [each for each in every if (each.name, each.camera) not in fitted]
-    if not fields:
-        return ()
-    unknowns, solved = with_fields(bundle, (*known, *fields), pixels)
-    places = unknowns.layout.fields[len(known) :]
-    new = np.concatenate([np.arange(at.start, at.stop) for at in places])
-    rest = np.delete(np.arange(unknowns.number), new)
-    gain = bundle.effective @ inverse(
-        (solved.information + solved.measured + solved.prior)[np.ix_(rest, rest)]
-    )
-    return tuple(
-        SearchedField(field, found, gain @ solved.information[rest, at])
-        for field, found, at in zip(
-            fields, solved.components.fields[len(known) :], places, strict=True
-        )
-    )
-
 
 @dataclass(frozen=True)
 class FoundField:
-    """A field that is fitted."""
+    """A field that the images show beyond doubt."""
 
     name: FieldName
-    camera: str  # name of the camera of a rig; else empty
-    size: float  # root mean square shift, px
+    camera: str  # name of the camera of a rig that it shifts most; else empty
+    size: float  # root mean square shift of its images, px
     gain: float  # twice the log likelihood ratio to no field
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether chance makes it less than once in a thousand."""
-        return self.gain > chi_square_quantile(1, CERTAIN)
 
     @property
     def message(self) -> Message:
@@ -116,7 +60,10 @@ class FoundField:
 
 
 def found_fields(bundle: Bundle) -> tuple[FoundField, ...]:
-    """Return the fields that a fit supports, the likeliest first."""
+    """Return the fields that chance makes less than once in a thousand.
+
+    The likeliest first; what a camera file states of its lens is none.
+    """
     names, found = bundle.state.rig.names, []
     for field, place, component in zip(
         bundle.unknowns.fields,
@@ -124,13 +71,15 @@ def found_fields(bundle: Bundle) -> tuple[FoundField, ...]:
         bundle.components.fields,
         strict=True,
     ):
-        if field.is_supported(component) and np.isfinite(component.gain):
-            at = field.camera
-            of = slice(None) if at is None else at
-            shifts = field.columns[:, of] @ bundle.values[place]
-            size = float(np.sqrt(np.mean(shifts[bundle.used[:, of]] ** 2)))
-            camera = "" if at is None or not names else names[at]
-            found.append(FoundField(field.name, camera, size, component.gain))
+        if not field.is_exact and component.gain > chi_square_quantile(1, CERTAIN):
+            shifts = field.columns @ bundle.values[place]
+            sizes = [
+                float(np.sqrt(np.mean(shifts[:, c][used] ** 2)))
+                for c, used in enumerate(np.swapaxes(bundle.used, 0, 1))
+            ]
+            at = int(np.argmax(sizes))
+            camera = "" if field.name is FieldName.BEND or not names else names[at]
+            found.append(FoundField(field.name, camera, sizes[at], component.gain))
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
@@ -223,7 +172,6 @@ class Adjustment:
     priors: Priors  # as stated or assumed, with contradicted numbers released
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
-    fields: tuple[SearchedField, ...]  # those that are not fitted
     step: ChangePoint | None  # between two images; the fit does not contain it
 
 
@@ -264,7 +212,8 @@ def adjust(
         Standard deviation of each centre by its detector, px.
     """
     modes = seat_modes_of(state.rotations, shifts)
-    fit = partial(fit_bundle, pixels, state, modes=modes, places=places)
+    fields = image_fields(pixels, np.isfinite(pixels[..., 0]), state)
+    fit = partial(fit_bundle, pixels, state, modes=modes, places=places, fields=fields)
     inflation = 1.0
     fitted = _fit_consistent(partial(fit, inflation=1.0), pixels, state, priors, sigmas)
     if fitted.correlation.factor > RELATED:
@@ -276,22 +225,13 @@ def adjust(
     shrunk = shrunk_priors(bundle, fitted.priors)
     if shrunk is not fitted.priors:
         same = bundle.unknowns
-        bundle = fit(
-            shrunk,
-            inflation=inflation,
-            fields=same.fields,
-            noise=same.noise,
-            begin=bundle,
-        )
+        bundle = fit(shrunk, inflation=inflation, noise=same.noise, begin=bundle)
         correlation = measure_correlation(bundle, pixels)
-    fields = search_fields(bundle, pixels)
     # Fixed lamps show a motion of the camera, which is then corrected.
     step = find_step(bundle, pixels) if shifts is None else None
     if correlation.components is not None:
         bundle = replace(bundle, budget_components=correlation.components)
-    return Adjustment(
-        bundle, fitted.priors, fitted.contradictions, correlation, fields, step
-    )
+    return Adjustment(bundle, fitted.priors, fitted.contradictions, correlation, step)
 
 
 def _fit_consistent(
@@ -310,14 +250,6 @@ def _fit_consistent(
     if of_centers is not None:
         fit = partial(fit, noise=of_centers)
         bundle = fit(priors, begin=bundle)
-    # With all fields at once: what seat and drift would absorb of one is its own.
-    every = image_fields(pixels, bundle.used, bundle.state)
-    among = fit(priors, fields=every, begin=bundle)
-    both = zip(every, among.components.fields, strict=True)
-    fields = tuple(each for each, found in both if each.is_supported(found))
-    if fields:
-        fit = partial(fit, fields=fields)
-        bundle = fit(priors, begin=among)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)

@@ -30,6 +30,7 @@ from lightpen.estimation.bundle.image_fields import (
     FieldName,
     ImageField,
     SeatModes,
+    image_fields,
     seat_modes_of,
 )
 from lightpen.estimation.bundle.linearised import (
@@ -293,22 +294,6 @@ class Solved(NamedTuple):
     sigma: float
 
 
-def with_fields(
-    bundle: Bundle, fields: tuple[ImageField, ...], pixels: FloatArray
-) -> tuple[Unknowns, Solved]:
-    """Return the linear solution about a fit with other fields, and its unknowns.
-
-    Components are estimated anew, as those of the fit may have absorbed a field;
-    ``pixels`` (N, C, L, 2) as fitted, px.
-    """
-    unknowns = bundle.unknowns.with_fields(fields)
-    now = _begun(unknowns, bundle, pixels)
-    jitter = bundle.components.jitter
-    components = NO_COMPONENTS._replace(jitter=jitter).with_no_fields(fields)
-    now = now._replace(components=components)
-    return unknowns, _solve(unknowns, now, bundle.weight_sigma, with_components=True)
-
-
 def solved_at_rest(bundle: Bundle, pixels: FloatArray) -> tuple[Solved, FloatArray]:
     """Return the linear solution about a fit without drift and seat, but with jitter.
 
@@ -337,10 +322,11 @@ def one_step(
     ``pixels`` (N, C, L, 2), px, are as in `fit_bundle`; those ``used`` (N, C, L) have a
     noise ``sigma``, px.
     """
-    unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
+    fields = image_fields(pixels, used, state)
+    unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations), fields)
     views = unknowns.views_at(state, pixels)
-    values = np.zeros(unknowns.number)
-    now = _Linearised(state, values, views, used, NO_COMPONENTS, sigma)
+    values, components = np.zeros(unknowns.number), NO_COMPONENTS.with_no_fields(fields)
+    now = _Linearised(state, values, views, used, components, sigma)
     solved = _solve(unknowns, now, sigma, with_components=False)
     for _ in range(SEAT_ROUNDS):
         # The jitter first: without it, other random effects would absorb it.
@@ -377,8 +363,9 @@ def _begun(unknowns: Unknowns, begin: Bundle, pixels: FloatArray) -> _Linearised
     for place, known in zip(at.cameras, of.cameras, strict=True):
         values[place] = begin.values[known]
     views = unknowns.views_at(begin.state, pixels)
-    components = begin.components.with_no_fields(unknowns.fields)
-    return _Linearised(begin.state, values, views, begin.used, components, begin.sigma)
+    return _Linearised(
+        begin.state, values, views, begin.used, begin.components, begin.sigma
+    )
 
 
 def _solve(

@@ -15,7 +15,7 @@ from lightpen.estimation.bundle.linearised import (
     whole_moves,
 )
 from lightpen.model.camera import Camera
-from lightpen.model.coverage import chi_square_quantile, symmetric_root
+from lightpen.model.coverage import symmetric_root
 from lightpen.model.fisheye import correlation
 from lightpen.model.rigid import skew
 
@@ -97,7 +97,6 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
-NONE = 0.4  # prior probability that there is no field
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 
@@ -110,19 +109,20 @@ class FieldName(StrEnum):
     BEND = "pen bend"
 
 
-# How often chance alone supports a field, at most. One lens field too many hardly costs
-# accuracy; a tilt too many may cost several standard uncertainties of the tip.
-CHANCE = {FieldName.LENS: 0.1, FieldName.TILT: 0.01, FieldName.BEND: 0.1}
-# Largest standard deviations: px, of a tilt by the sine of the lean; of a bend, mm.
+# Half of all stations have less, before their images: px, of a tilt by the sine of the
+# lean; of a bend, mm. The prior of a size is half a Cauchy distribution.
+USUAL_SIZES = {FieldName.LENS: 0.001, FieldName.TILT: 0.0015, FieldName.BEND: 0.005}
 LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}
 
 
 class FieldComponent(NamedTuple):
-    """Size of a field by likelihood."""
+    """A field on average over its possible sizes, by their likelihood."""
 
     sigma: float  # standard deviation of maximum likelihood, px
     gain: float  # twice the log likelihood ratio to no field
-    covariance: FloatArray  # (k, k), of the unknowns, averaged over the likelihood
+    # (k, k), prior of the unknowns by which a fit gives their average over the sizes.
+    covariance: FloatArray
+    spread: FloatArray  # (k, k), covariance of the estimates by the sizes
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,46 +148,52 @@ class ImageField:
         """A square root of each shape, (k, k)."""
         return tuple(map(symmetric_root, self.shapes))
 
-    def is_supported(self, found: FieldComponent) -> bool:
-        """Return whether chance alone hardly makes such a gain."""
-        return found.gain > chi_square_quantile(1, CHANCE[self.name])
-
 
 def held(field: ImageField) -> FieldComponent:
     """Return the component of a field held at 0, or as its file states it."""
+    nothing = np.zeros_like(field.shapes[0])
     if field.is_exact:
-        return FieldComponent(1.0, np.inf, field.shapes[0])
-    return FieldComponent(0.0, 0.0, np.zeros_like(field.shapes[0]))
+        return FieldComponent(1.0, np.inf, field.shapes[0], nothing)
+    return FieldComponent(0.0, 0.0, nothing, nothing)
 
 
 def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldComponent:
-    """Find the size of a field by restricted likelihood.
+    """Average a field over its sizes by their restricted likelihood.
 
     ``S`` (k, k) and ``right`` (k,) are information about its unknowns, all others
-    marginalised, and the right side.
+    marginalised, and the right side. A size makes the estimate A_s right with the
+    covariance ``A_s = (S + K_s^-1)^-1``, and their average A is that of one prior.
     """
     if field.is_exact:
         return held(field)
     sigmas = LARGEST[field.name] * np.geomspace(SMALLEST, 1.0, N_SCALES)
-    costs = np.array([_costs(S, right, root, sigmas) for root in field.roots])
-    gain = -float(costs.min())
-    sigma = float(sigmas[int(np.argmin(costs.min(axis=0)))])
-    weights = np.exp(-0.5 * (costs + gain)) * (1 - NONE) / costs.size
-    weights /= weights.sum() + NONE * np.exp(-0.5 * gain)
-    covariance = np.einsum("s,sij->ij", weights @ sigmas**2, np.array(field.shapes))
-    return FieldComponent(sigma, gain, covariance)
-
-
-def _costs(
-    S: FloatArray, right: FloatArray, root: FloatArray, sigmas: FloatArray
-) -> FloatArray:
-    """Return twice the negative log likelihood ratio to no field, of each size."""
-    seen, turned = np.linalg.eigh(root.T @ S @ root)
-    seen, right = np.maximum(seen, 0.0), (root @ turned).T @ right
-    variances = sigmas[:, None] ** 2
-    excess = 1 + seen * variances
-    gains = variances * right**2 / excess
-    return np.asarray(np.log(excess).sum(axis=1) - gains.sum(axis=1))
+    variances, ratios = sigmas[:, None] ** 2, sigmas / USUAL_SIZES[field.name]
+    parts = []
+    for root in field.roots:
+        seen, turned = np.linalg.eigh(root.T @ S @ root)
+        ways = root @ turned
+        gains = variances / (1 + np.maximum(seen, 0.0) * variances)
+        costs = np.log(variances / gains) - gains * (ways.T @ right) ** 2
+        parts.append((ways, gains, costs.sum(axis=1)))
+    costs = np.array([part[-1] for part in parts])
+    best = float(costs.min())
+    weights = np.exp(-0.5 * (costs - best)) * ratios / (1 + ratios**2)
+    weights /= weights.sum()
+    size, average = len(S), np.zeros_like(S)
+    moments = np.zeros_like(S)
+    for weight, (ways, gains, _) in zip(weights, parts, strict=True):
+        average += (ways * (weight @ gains)) @ ways.T
+        estimates = gains * (ways.T @ right)
+        moments += ways @ (estimates.T * weight) @ estimates @ ways.T
+    mean = average @ right
+    root = symmetric_root(average)
+    covariance = root @ np.linalg.inv(np.eye(size) - root @ S @ root) @ root
+    return FieldComponent(
+        float(sigmas[int(np.argmin(costs.min(axis=0)))]),
+        -best,
+        0.5 * (covariance + covariance.T),
+        moments - np.outer(mean, mean),
+    )
 
 
 def image_fields(
@@ -202,12 +208,13 @@ def image_fields(
     lenses = [_lens(camera, c, pixels, used) for c, camera in enumerate(cameras)]
     lean = rotations[:, :, 1] @ axes_of_cone(rotations)[:2].T
     lean -= lean.mean(axis=0)
-    tilts = []
+    tilts = np.zeros((*pixels.shape, 4 * len(cameras)))
     for c in range(len(cameras)):
-        columns = np.zeros((*pixels.shape, 4))
-        columns[:, c, :, 0, :2] = columns[:, c, :, 1, 2:] = lean[:, None]
-        tilts.append(ImageField(FieldName.TILT, c, columns, (np.eye(4),)))
-    return (*lenses, *tilts, _bend(pixels, state))
+        own = tilts[:, c, ..., 4 * c : 4 * c + 4]
+        own[:, :, 0, :2] = own[:, :, 1, 2:] = lean[:, None]
+    # On one floor: all cameras have one size.
+    tilt = ImageField(FieldName.TILT, None, tilts, (np.eye(4 * len(cameras)),))
+    return (*lenses, tilt, _bend(pixels, state))
 
 
 def _bend(pixels: FloatArray, state: BundleState) -> ImageField:

@@ -179,10 +179,6 @@ class Unknowns:
             ),
         )
 
-    def with_fields(self, fields: tuple[ImageField, ...]) -> "Unknowns":
-        """Return the unknowns with other fields."""
-        return Unknowns.of(self.start, self.priors, self.modes, fields, self.noise)
-
     def views_at(
         self, state: BundleState, pixels: FloatArray
     ) -> tuple[CameraView, ...]:

@@ -51,7 +51,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *(each.message for each in calibration.contradictions),
         *lamp_warnings(calibration),
         *_seat_warnings(calibration),
-        *(each.message for each in calibration.fields if each.is_certain),
+        *(each.message for each in calibration.fields),
         *_copy_warnings(calibration),
         *([message("warning.own-images")] if calibration.shares_images else []),
         *_noise_warnings(calibration),

@@ -46,7 +46,7 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import Adjustment, SearchedField
+from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.image_fields import MODE_COUNTS, FieldName
 from lightpen.estimation.bundle.linearised import N_CONE, whole_moves
@@ -56,7 +56,7 @@ from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )
-from lightpen.model.coverage import COVERAGE_FACTOR, chi_square_quantile
+from lightpen.model.coverage import COVERAGE_FACTOR, chi_square_quantile, inverse
 
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
@@ -165,9 +165,7 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     n_images = int(bundle.used.any(axis=(1, 2)).sum())
     return Budget(
-        shares=contributions_of(
-            bundle, n_images, raised * correlation.noise, adjustment.fields
-        ),
+        shares=contributions_of(bundle, n_images, raised * correlation.noise),
         independent_noise=bundle.independent_noise,
         blocks=blocks,
         block_ratio=ratio,
@@ -177,10 +175,7 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
 
 
 def contributions_of(
-    bundle: Bundle,
-    n_images: float,
-    noise: FloatArray,
-    fields: Sequence[SearchedField] = (),
+    bundle: Bundle, n_images: float, noise: FloatArray
 ) -> tuple[UncertaintyContribution, ...]:
     """Return the contributions to the covariance of (tip, cone), equations (15)-(18).
 
@@ -190,8 +185,6 @@ def contributions_of(
         Images that take part.
     noise : (6, 6) array
         Covariance by image noise, mm^2.
-    fields : sequence of SearchedField
-        That are not fitted.
     """
     at, priors = bundle.layout, bundle.unknowns.priors
     jitter = bundle.propagated(bundle.jitter_information + bundle.insignificant_jitter)
@@ -199,9 +192,9 @@ def contributions_of(
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
     leds = bundle.component_contribution(at.leds) + _of_faces(bundle)
-    leds += _of_fields(bundle, fields, FieldName.BEND)
-    lens = center_errors(bundle, n_images) + _of_fields(bundle, fields, FieldName.LENS)
-    camera = _of_cameras(bundle) + _of_fields(bundle, fields, FieldName.TILT)
+    leds += _of_fields(bundle, FieldName.BEND)
+    lens = center_errors(bundle, n_images) + _of_fields(bundle, FieldName.LENS)
+    camera = _of_cameras(bundle) + _of_fields(bundle, FieldName.TILT)
     shares = [
         UncertaintyContribution(ContributionName.NOISE, noise),
         UncertaintyContribution(ContributionName.SEAT, jitter + moved),
@@ -264,12 +257,9 @@ def _of_cameras(bundle: Bundle) -> FloatArray:
     return covariance
 
 
-def _of_fields(
-    bundle: Bundle, fields: Sequence[SearchedField], name: FieldName
-) -> FloatArray:
-    """Return the covariance (6, 6) by fields: of those held at 0, and those fitted."""
-    held = (each.covariance for each in fields if each.field.name is name)
-    covariance = sum(held, np.zeros((6, 6)))
+def _of_fields(bundle: Bundle, name: FieldName) -> FloatArray:
+    """Return the covariance (6, 6) by fields: at each size, and by what size it is."""
+    covariance = np.zeros((6, 6))
     for field, place, found in zip(
         bundle.unknowns.fields,
         bundle.layout.fields,
@@ -277,8 +267,11 @@ def _of_fields(
         strict=True,
     ):
         if field.name is name:
-            gain = bundle.gain[:, place] @ bundle.prior_information[place, place]
-            covariance = covariance + gain @ found.covariance @ gain.T
+            both = bundle.gain[:, place]
+            gain = both @ bundle.prior_information[place, place]
+            covariance += gain @ found.covariance @ gain.T
+            by_field = both @ inverse(bundle.covariance[place, place])
+            covariance += by_field @ found.spread @ by_field.T
     return covariance
 
 

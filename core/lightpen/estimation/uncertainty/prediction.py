@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import search_fields, shrunk_priors
+from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, one_step
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of
@@ -75,9 +75,8 @@ def predict_uncertainty(
     shrunk = shrunk_priors(bundle, priors)
     if shrunk is not priors:
         bundle = _with_priors(bundle, shrunk)
-    fields = search_fields(replace(bundle, values=np.zeros_like(bundle.values)), pixels)
     n_images = int(used.any(axis=(1, 2)).sum())
-    now = contributions_of(bundle, n_images, bundle.independent_noise, fields)
+    now = contributions_of(bundle, n_images, bundle.independent_noise)
     endless = contributions_of(_with_endless_images(bundle), n_images, np.zeros((6, 6)))
     lasting = [each for each in endless if each.name not in IMAGES_SHRINK]
     share = min(n_images / POSTURES, 1.0)  # of the errors that do not average out
@@ -104,11 +103,12 @@ def _with_endless_images(bundle: Bundle) -> Bundle:
     """Return the adjustment with endless images of the same kind."""
     information = ENDLESS * bundle.information
     nothing = np.zeros_like(information)
-    prior = bundle.unknowns.prior_information(NO_COMPONENTS)
+    components = NO_COMPONENTS.with_no_fields(bundle.unknowns.fields)
+    prior = bundle.unknowns.prior_information(components)
     return replace(
         bundle,
-        components=NO_COMPONENTS,
-        budget_components=NO_COMPONENTS,
+        components=components,
+        budget_components=components,
         information=information,
         prior_information=prior,
         jitter_information=nothing,

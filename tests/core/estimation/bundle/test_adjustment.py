@@ -54,7 +54,7 @@ def test_a_right_file_that_states_nothing_is_taken_as_it_is() -> None:
 def test_u_covers_a_file_that_is_off_and_states_nothing(off: float) -> None:
     found, error = adjusted(off)
     bundle = found.bundle
-    shares = contributions_of(bundle, 60, found.correlation.noise, found.fields)
+    shares = contributions_of(bundle, 60, found.correlation.noise)
     covariance = sum((each.covariance for each in shares), np.zeros((6, 6)))
 
     assert (np.abs(error) < 2.5 * np.sqrt(np.diag(covariance)[:3])).all()

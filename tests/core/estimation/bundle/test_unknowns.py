@@ -250,11 +250,10 @@ def test_jitter_of_the_seat_is_found_with_its_size_and_its_share() -> None:
     assert result.bundle.sigma == pytest.approx(0.02, rel=0.1)
     # In x and y of the tip the mean of 60 such places is off by 10 um / sqrt(60).
     assert (share(result, ContributionName.SEAT) > 0.5 * 0.01 / np.sqrt(60)).all()
-    still = calibrated(replace(PEN, led_sigma=0.002), 0.02, 9)
-    noise, of_still = (
-        np.diag(each.budget.independent_noise)[:3] for each in (result, still)
-    )
-    assert (np.sqrt(noise / of_still) < 1.6).all()  # 2.2 if it were noise as well
+    bundle = result.bundle
+    counted_twice = np.diag(bundle.propagated(bundle.information))[:3]
+    noise = np.diag(result.budget.independent_noise)[:3]
+    assert (np.sqrt(noise / counted_twice) < 0.5).all()
 
 
 def test_jitter_of_the_seat_in_few_images_is_taken_for_nothing_else() -> None:
