@@ -17,9 +17,19 @@ from installer.trial import (
     last_option,
 )
 
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.model.limits import SwingLimits
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import OPENER, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen_program.self_test import FILE_LIST, NAMES, damaged_files, record_swing
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.swing_recorder import record_header
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
+from lightpen_program.self_test import FILE_LIST, damaged_files
 
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere
@@ -32,6 +42,10 @@ NEEDED = (
     "cryptography.hazmat.bindings._rust",
 )
 SIZE_LIMIT = 350e6  # bytes installed
+PERIOD_S = 0.1  # s from image to image
+# With blanks and letters that a Windows of another language has no code page for.
+NAMES = Names("Prüfstand 1", "自检", "SELF-TEST", "T-1 ä", "C-1", 10.0)
+SCENE = Scene(n_images=60, camera=paper_camera(binning=2), led_noise=0.0)
 
 
 def try_installation(trial: Trial, version: str) -> None:
@@ -127,6 +141,29 @@ def try_demo(trial: Trial) -> None:
     shown = "" if tip is None else tip[0].strip()
     what = f"demo accepts its tip, {played.seconds:.0f} s: {shown}"
     trial.expect(what, is_accepted, played)
+
+
+def record_swing(folder: Path, files: Path) -> None:
+    """Render a swing and record it; write the files of camera and pen to a folder."""
+    written = write_sample_files(SCENE, files)
+    preparation = Preparation(
+        names=NAMES,
+        camera_file=CameraFile.read(written.camera),
+        pen_file=PenFile.read(written.pen),
+        limits=replace(SwingLimits(), min_per_field=0),
+    )
+    setup = preparation.swing_setup()
+    with RecordWriter.create(folder, record_header(preparation)) as writer:
+        for image_plan in plan_scene(SCENE).image_plans:
+            image = render_plan(SCENE, image_plan)
+            seen = detect_pen(image, setup.camera, setup.pen)
+            writer.append(
+                image,
+                seen.pixels,
+                seen.rotation,
+                seen.translation,
+                image_plan.index * PERIOD_S,
+            )
 
 
 def try_double_click(trial: Trial) -> None:

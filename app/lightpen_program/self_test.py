@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,26 +23,14 @@ from types import TracebackType
 from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
+from lightpen import calibrate, detect, find_images, read_camera, read_pen, reported
 from lightpen.cameras.pairing import SkippingClock
-from lightpen.detection.pen_detection import detect_pen
-from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.live.sources import SourceEnvironment
-from lightpen.local_time import local_now
-from lightpen.model.limits import SwingLimits
-from lightpen.record.results.acceptance import accept
-from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen.record.swings.header import Names
-from lightpen.record.swings.reading import open_record
-from lightpen.record.swings.solving import solve_record
-from lightpen.record.swings.writing import RecordWriter
-from lightpen.swing.preparation import Preparation
-from lightpen.swing.swing_recorder import record_header
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
 from lightpen_app.work.settings import Settings
-from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
-from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scene_files import write_scene
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import paper_camera
@@ -218,14 +206,12 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
         found.append(desk.platform())
     with report.check("fonts") as found:
         found.append(desk.tested_fonts())
-    with report.check("record") as found:
-        found.append(desk.tested_record())
     with report.check("window") as found:
         picture = report.file.with_suffix(".png")
         found.append(desk.drawn_window(picture))
         report.screenshot = str(picture)
     with report.check("tip") as found:
-        report.tip = tip = desk.accepted_tip()
+        report.tip = tip = desk.found_tip()
         found.append(_judged(tip))
     report.is_complete = True
 
@@ -280,43 +266,8 @@ CLASSES_WITH_FONTS = (
 )
 
 
-N_IMAGES = 60
-PERIOD = 0.1  # s from image to image
-# With blanks and letters that a Windows of another language has no code page for.
-NAMES = Names("Prüfstand 1", "自检", "SELF-TEST", "T-1 ä", "C-1", 10.0)
 # A quarter of the usual pixels makes the test short.
-SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
-
-
-def record_swing(folder: Path, files: Path) -> None:
-    """Render the images of `SCENE` and record them with their detections.
-
-    The files of camera and pen are written to a folder. Raises `SelfTestError` if the
-    pen is not found in an image.
-    """
-    written = write_sample_files(SCENE, files)
-    preparation = Preparation(
-        names=NAMES,
-        camera_file=CameraFile.read(written.camera),
-        pen_file=PenFile.read(written.pen),
-        limits=replace(SwingLimits(), min_per_field=0),
-    )
-    setup = preparation.swing_setup()
-    with RecordWriter.create(folder, record_header(preparation)) as writer:
-        for image_plan in plan_scene(SCENE).image_plans:
-            image = render_plan(SCENE, image_plan)
-            seen = detect_pen(image, setup.camera, setup.pen)
-            if not seen.has_pose:
-                raise SelfTestError(
-                    f"The pen is not found in rendered image {image_plan.index + 1}."
-                )
-            writer.append(
-                image,
-                seen.pixels,
-                seen.rotation,
-                seen.translation,
-                image_plan.index * PERIOD,
-            )
+SCENE = Scene(camera=paper_camera(binning=2), led_noise=0.0)
 
 
 LETTERS = "Aaµ°±光笔校准"
@@ -325,14 +276,13 @@ LETTERS = "Aaµ°±光笔校准"
 class Desk:
     """An application with its own data folder.
 
-    Records, results and settings are in a folder; nothing of the user's is touched.
+    Images, results and settings are in a folder; nothing of the user's is touched.
     """
 
     def __init__(self, folder: Path) -> None:
         self._data = folder / "data"
-        self._files = folder / "files"
+        self._swing = folder / "swing 光笔"
         self._settings = folder / "lightpen.json"
-        self._record = self._data / RECORDS / "self-test"
         if not has_display():
             os.environ["QT_QPA_PLATFORM"] = "offscreen"
         self._application = make_application(sys.argv[:1])
@@ -362,14 +312,6 @@ class Desk:
             if family != FAMILIES[0]:
                 raise SelfTestError(f"{name} is shown in {family}, not {FAMILIES[0]}.")
         return ", ".join(FAMILIES)
-
-    def tested_record(self) -> str:
-        """Write a rendered swing, and read it back."""
-        record_swing(self._record, self._files)
-        n_images = len(open_record(self._record).images)
-        if n_images != N_IMAGES:
-            raise SelfTestError(f"{n_images} of {N_IMAGES} images came back.")
-        return f"{n_images} images written and read back"
 
     def drawn_window(self, picture: Path) -> str:
         """Show the window until all pages are made, and draw it."""
@@ -404,13 +346,12 @@ class Desk:
             raise SelfTestError(" ".join(faults))
         return "drawn"
 
-    def accepted_tip(self) -> Tip:
-        """Find and accept the tip of the swing; return it and the true one."""
-        archive = FolderArchive(self._data)
-        accept(archive, solve_record(open_record(self._record)), local_now())
-        result = archive.in_force(NAMES.pen, NAMES.tip, is_simulated=True)
-        if result is None:
-            raise SelfTestError("The accepted result is not current.")
-        return Tip(
-            result.tip_pen.tolist(), SCENE.tip_pen.tolist(), result.uncertainty.tolist()
-        )
+    def found_tip(self) -> Tip:
+        """Calibrate the tip of a rendered swing; return it and the true one."""
+        true_tip = write_scene(SCENE, self._swing)
+        camera = read_camera(self._swing / "camera.yaml")
+        pen = read_pen(self._swing / "leds.csv")
+        seen = detect(find_images(str(self._swing / "images")), camera, pen)
+        found = reported(calibrate(camera, pen, seen))
+        u = found.expanded_uncertainty[:3].tolist()
+        return Tip(found.tip_pen.tolist(), true_tip.tolist(), u)

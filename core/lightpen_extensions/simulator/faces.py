@@ -131,24 +131,6 @@ def blurred_insides(contours: Contours, sigma: float, margin: int = 0) -> list[P
     return patches
 
 
-@dataclass(frozen=True, eq=False)
-class Outlines:
-    """Areas and centroids of outlines."""
-
-    areas: FloatArray  # (N,), px^2
-    centroids: FloatArray  # (N, 2), px
-
-
-def measure_insides(contours: Contours) -> Outlines:
-    """Return exact areas and centroids of outlines, by Green's theorem."""
-    middles = contours.nodes.mean(axis=1, keepdims=True)
-    x, y = np.moveaxis(contours.nodes - middles, -1, 0)
-    dy = contours.steps[..., 1]
-    areas = (x * dy).sum(axis=-1)
-    moments = np.stack([(x * x * dy / 2).sum(axis=-1), (x * y * dy).sum(axis=-1)], -1)
-    return Outlines(np.abs(areas), middles[:, 0] + moments / areas[:, None])
-
-
 class _BlurTables(NamedTuple):
     """The blurred pixel g * b and its integral Q, sampled finely around 0."""
 

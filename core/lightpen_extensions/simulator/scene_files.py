@@ -15,9 +15,8 @@ from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import mark_simulated, why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_camera, write_rig
-from lightpen.model.ellipse import disc_images
+from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import Rig, fit_rigid, from_first
-from lightpen_extensions.simulator.faces import disc_contours, measure_insides
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
     ScenePlan,
@@ -33,13 +32,6 @@ Json: TypeAlias = dict[str, Any]
 Report: TypeAlias = Callable[[float], None]
 
 N_THREADS = 2  # one renders while another compresses
-NOTES = (
-    "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
-    "conic image of the disc contour in the undistorted normalised plane, then "
-    "distorted to px; centroid: area centroid of the exact distorted disc region; all "
-    "of the whole disc at mid-exposure. visible: lit. saturated: brighter than full "
-    "scale."
-)
 
 
 @dataclass(frozen=True)
@@ -167,46 +159,16 @@ def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
 
 
 def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
-    """Return the ground truth of a set, as JSON.
+    """Return the ground truth of a set, as JSON: lengths in mm, image points in px.
 
-    Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
+    The pen is at ``R x + T`` in the camera at mid-exposure. Of an LED there are its
+    centre, projected, and that of the ellipse that its disc makes, distorted.
     """
     scene = plan.scene
-    camera = scene.camera
-    optics, sensor = scene.optics, scene.sensor
     return {
-        "units": "mm, px, deg; pixel (0,0) is the centre of the top-left pixel",
-        "camera": {
-            "image_width": camera.width,
-            "image_height": camera.height,
-            "fx": camera.fx,
-            "fy": camera.fy,
-            "cx": camera.cx,
-            "cy": camera.cy,
-            **dict(
-                zip(camera.distortion_names, camera.distortion.tolist(), strict=True)
-            ),
-        },
+        "units": "mm, px; pixel (0,0) is the centre of the top-left pixel",
         "pen": _pen_truth(plan),
         "cone_point": scene.cone_cam.tolist(),
-        "image_model": {
-            "bits": sensor.bits,
-            "psf_gauss_sigma_px": optics.psf_sigma,
-            "pixel": "100% fill box",
-            "faces": scene.faces,
-            "halo": optics.halo,
-            "ghost": optics.ghost,
-            "radiance_cos_power": optics.cos_power,
-            "peak_dn": optics.peak * optics.exposure * sensor.full_scale,
-            "full_well_e": sensor.full_well,
-            "e_per_dn": sensor.electrons_per_dn,
-            "read_noise_e": sensor.read_noise,
-            "offset_dn": sensor.offset / sensor.electrons_per_dn,
-            "background": optics.background,
-            "background_gradient": list(optics.gradient),
-            "vignetting": "none",
-        },
-        "notes": NOTES,
         "seed": scene.seed,
         "frames": [
             _image_truth(plan, image_plan, folder) for image_plan in plan.image_plans
@@ -266,62 +228,30 @@ def _pen_truth(plan: ScenePlan) -> Json:
 
 
 def _image_truth(plan: ScenePlan, image_plan: ImagePlan, folder: str) -> Json:
-    scene, swing, index = plan.scene, plan.swing, image_plan.index
-    tilt, direction, roll = np.degrees(
-        [
-            swing.postures.tilts[index],
-            swing.postures.directions[index],
-            swing.postures.rolls[index],
-        ]
-    )
+    swing, index = plan.swing, image_plan.index
     return {
         "file": f"{folder}frame_{index + 1:04d}.png",
         "R": image_plan.rotation.tolist(),
         "T": image_plan.translation.tolist(),
         "tip_cam": swing.tips_cam[index].tolist(),
-        "posture": {
-            "tilt_deg": tilt,
-            "tilt_dir_deg": direction % 360,
-            "roll_deg": roll,
-        },
         "tip_in_cone": not swing.slipped[index],
-        "leds": _led_truths(scene, image_plan),
+        "leds": _led_truths(plan.scene, image_plan),
     }
 
 
 def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
-    camera, pen, view = scene.camera, scene.pen, image_plan.view
+    camera, pen = scene.camera, scene.pen
     leds, normals = leds_in_camera(pen, image_plan.rotation, image_plan.translation)
-    ellipses = disc_images(camera, leds, normals, pen.diameter / 2)
-    contours = disc_contours(
-        camera, leds[None], normals[None], pen.diameter / 2, scene.optics.psf_sigma
-    )
-    insides = measure_insides(contours)
-    levels = view.gains * led_levels(leds, normals, image_plan.optics)
+    levels = image_plan.view.gains * led_levels(leds, normals, image_plan.optics)
     projected = camera.project(leds)
-    cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)
+    centers = ellipse_centers(camera, leds, normals, pen.diameter / 2)
     return [
         {
             "led": led + 1,
-            "xyz_cam": leds[led].tolist(),
-            "normal_cam": normals[led].tolist(),
             "proj": projected[led].tolist(),
-            "ellipse_center": ellipses.centers[led].tolist(),
-            "centroid": insides.centroids[led].tolist(),
-            **_axes_truth(ellipses.shapes[led]),
-            "area_px": float(insides.areas[led]),
-            "view_angle_deg": float(np.degrees(np.arccos(cosines[led]))),
+            "ellipse_center": centers[led].tolist(),
             "visible": bool(levels[led] > 0),
             "saturated": bool(levels[led] >= 1),
         }
         for led in range(pen.n_leds)
     ]
-
-
-def _axes_truth(shape: FloatArray) -> Json:
-    variances, directions = np.linalg.eigh(shape)
-    major = directions[:, 1]
-    return {
-        "semi_axes": (2 * np.sqrt(variances[::-1])).tolist(),
-        "angle_deg": float(np.degrees(np.arctan2(major[1], major[0])) % 180),
-    }

@@ -2,6 +2,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from tests.simulated_outlines import measure_insides
 
 from lightpen.arrays import FloatArray
 from lightpen_extensions.simulator.faces import (
@@ -10,7 +11,6 @@ from lightpen_extensions.simulator.faces import (
     blurred_insides,
     disc_contours,
     ellipse_contour,
-    measure_insides,
 )
 from lightpen_extensions.simulator.swings import (
     Postures,

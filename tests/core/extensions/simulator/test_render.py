@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 from tests.simulated_disturbances import Finger, Glare, hidden_fraction, moving_poses
+from tests.simulated_outlines import measure_insides
 from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.faces import disc_contours, measure_insides
+from lightpen_extensions.simulator.faces import disc_contours
 from lightpen_extensions.simulator.render import Light, led_levels, render_view
 from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
