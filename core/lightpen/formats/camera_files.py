@@ -81,10 +81,13 @@ LARGEST_AMPLITUDE = 10.0  # px, of a lens field; more is another distortion
 SHORTEST_LENGTH = 10.0  # px
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
-_WIDTH = ("image_width", "width")
-_HEIGHT = ("image_height", "height")
-_SIZE = ("image_size", "resolution", "image_resolution", "img_size", "size")
-_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix")
+_WIDTH = ("image_width", "width", "w")
+_HEIGHT = ("image_height", "height", "h")
+_SIZE = (
+    *("image_size", "resolution", "image_resolution", "img_size", "size"),
+    "camera_res",
+)
+_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix", "intrinsics")
 _DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs"),
     *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
@@ -105,7 +108,7 @@ _FIELD_ENTRIES = (
 )
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "radial_tangential", "none"}
 _FLAG = ("fisheye", "fisheye_model")  # of caliscope, and of samples of OpenCV
-_FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
+_FISHEYE = {"equidistant", "equi", "fisheye", "kannala_brandt", "kannala_brandt4"}
 _MONTHS = [
     *("Jan", "Feb", "Mar", "Apr", "May", "Jun"),
     *("Jul", "Aug", "Sep", "Oct", "Nov", "Dec"),
@@ -249,9 +252,7 @@ def _from_matlab(entries: Entries) -> Camera:
             check_skew(entries.counted(1, "Skew")[0], entries)
     else:
         key = "K" if entries.has("K") else "IntrinsicMatrix"
-        matrix = entries.counted(9, key).reshape(3, 3)
-        transposed = np.array_equal(matrix[:, 2], [0, 0, 1])
-        pinhole = _pinhole(matrix.T if transposed else matrix, entries)
+        pinhole = _pinhole(entries.counted(9, key).reshape(3, 3), entries)
     pinhole[2:] -= 1  # the centre of the first pixel is (1, 1) in MATLAB
     radial = entries.numbers("RadialDistortion")
     if len(radial) not in (2, 3):
@@ -298,7 +299,9 @@ def _size(entries: Entries) -> tuple[float, float]:
 
 
 def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
-    """Return fx fy cx cy of a camera matrix."""
+    """Return fx fy cx cy of a camera matrix, by rows or, as of Apple, by columns."""
+    if np.array_equal(matrix[:, 2], [0, 0, 1]):
+        matrix = matrix.T
     if not np.array_equal(matrix[2], [0, 0, 1]) or matrix[1, 0] != 0:
         raise FileError("camera-file.matrix-form", name=entries.name)
     check_skew(matrix[0, 1], entries)

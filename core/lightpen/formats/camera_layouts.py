@@ -8,6 +8,7 @@ a number that means nothing. What a file does not have is 0.
 """
 
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import quoted
+from lightpen.formats.files import kind_of, quoted
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import N_COEFFICIENTS
@@ -83,8 +84,11 @@ def checked_distortion(
 ) -> FloatArray:
     """Return 5 or 8 coefficients, or the 4 of a fisheye; refuse others unless zero."""
     count = len(coefficients)
-    if count == 0 and entries.word("distortion_model").casefold() == "none":
-        return np.zeros(5)
+    given = [each for _, each in entries.values.values()]
+    lists = [each.get("data") if isinstance(each, dict) else each for each in given]
+    model = entries.word("distortion_model")
+    if count == 0 and (model == "none" or (model and [] in lists)):
+        return np.zeros(5 if lens is LensModel.BROWN else N_COEFFICIENTS)
     is_fisheye = lens is LensModel.KANNALA_BRANDT
     if is_fisheye and count == N_COEFFICIENTS:
         return coefficients
@@ -266,6 +270,27 @@ LAYOUTS = (
         fisheye="kannalabrandt",
     ),
     FileLayout(
+        "SVO",
+        marks="cameras",
+        part="cameras/camera",
+        size="image_width image_height",
+        numbers={"intrinsics": "fx fy cx cy", "distortion/parameters": "k1 k2 p1 p2"},
+        model="distortion/type",
+        brown="radialtangential none",
+        fisheye="equidistant",
+        of_fisheye={"distortion/parameters": "k1 k2 k3 k4"},
+    ),
+    FileLayout(
+        "Basalt",
+        marks="value0",
+        part="value0",
+        size="resolution",
+        numbers=_each(f"fx fy cx cy {_RADIAL}", "intrinsics/intrinsics/{}"),
+        model="intrinsics/camera_type",
+        brown="pinhole pinholeradtan8",
+        fisheye="kb4",
+    ),
+    FileLayout(
         "Nerfstudio",
         marks="fl_x w",
         size="w h",
@@ -273,6 +298,14 @@ LAYOUTS = (
         model="camera_model",
         brown="opencv pinhole simplepinhole",
         fisheye="opencvfisheye",
+        first=0.5,
+    ),
+    FileLayout(
+        "Nerfstudio (by image)",
+        marks="frames",
+        part="frames",
+        size="w h",
+        numbers=_each("fl_x:fx fl_y:fy cx cy k1 k2 p1 p2 k3 k4"),
         first=0.5,
     ),
     FileLayout(
@@ -336,6 +369,7 @@ _BY_IMAGES = message("camera-file.by-images")
 _OF_PROJECT = message("camera-file.of-project")
 _AS_TEXT = message("camera-file.as-text")
 _OF_PAIR = message("camera-file.of-pair")
+_OTHER_FILE = message("camera-file.other-file")
 FOREIGN = (
     (
         r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):|\"(area|line)_scan_",
@@ -343,10 +377,20 @@ FOREIGN = (
         _BY_IMAGES,
     ),
     (r"#\s*polynomial coefficients for the DIRECT", "OCamCalib", _BY_IMAGES),
-    (r"\"T_imu_cam\"", "Basalt", _BY_IMAGES),
     (r"(?m)^\s*Model\s*=\s*CAHV", "CAHVOR", _BY_IMAGES),
     (r"\APix4D camera calibration", "Pix4D", _BY_IMAGES),
+    (r"photoshop:CameraProfiles|<lensdatabase", "a lens profile", _BY_IMAGES),
     (r"<x:xmpmeta", "RealityCapture (XMP)", _AS_TEXT),
+    (r"\AfileName imageWidth imageHeight", "Pix4D (all images)", _AS_TEXT),
+    (r"<ExportAPERO>", "MicMac", _BY_IMAGES),
+    (r"\ANVM_V\d", "VisualSFM", _BY_IMAGES),
+    (r"\A([A-Z]\w+ )?(-?[\d.]+\s+){5,11}(crop|full|none)\b", "DSO", _BY_IMAGES),
+    (r"(?m)^\[CAMERA_PARAMS", "MRPT", _AS_TEXT),
+    (r"(?m)^camera\.\d\.A=\[", "DLR CalLab", _AS_TEXT),
+    (r"(?m)^(P0: |cam0=\[)", "rectified images (KITTI, Middlebury)", _BY_IMAGES),
+    (r"(?m)^\s+cam_model:|^\s+type: omni", "SVO (old, or omni)", _BY_IMAGES),
+    (r"(?m)^cam0_calib:", "VINS-Fusion (settings)", _OTHER_FILE),
+    (r"<IntrinsicStandardCameraModel", "Motive", _AS_TEXT),
     (r"<calibration[^>]*qtm-version", "Qualisys Track Manager", _AS_TEXT),
     (r"<Camera [^>]*DEVICEID", "Vicon (XCP)", _BY_IMAGES),
     (r"\A\s*Australis", "Australis", _BY_IMAGES),
@@ -368,21 +412,20 @@ FOREIGN = (
     (r"(?m)^model_type:\W*(?i:scaramuzza)", "camodocal (Scaramuzza)", _BY_IMAGES),
     (r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|mtx_l)\b", "a stereo pair", _OF_PAIR),
     (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
-    (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),
-    (r"\A(\x89HDF|.{512}\x89HDF)", "HDF5 (.mat, .h5)", _AS_TEXT),
-    (r"\A(\x93NUMPY|PK\x03\x04.{26,40}\.npy)", "numpy", _AS_TEXT),
-    (r"\A\x80[\x02-\x05].{1,12}(\x8c|\}|c)", "Python (pickle)", _AS_TEXT),
 )
 
 
 def refuse_foreign(data: bytes, name: str) -> None:
     """Refuse the file of a program whose lens model or form is not read, by name."""
     text = data[:100_000].decode("latin-1")
-    for pattern, program, remedy in FOREIGN:
-        if re.search(pattern, text, re.DOTALL):
-            raise FileError(
-                "camera-file.foreign", name=name, program=program, remedy=remedy
-            )
+    if data.startswith((BOM_UTF16_BE, BOM_UTF16_LE)):
+        text = text.replace("\0", "")
+    own = [(kind_of(data), _AS_TEXT)] if kind_of(data) else []
+    own += [(each, way) for mark, each, way in FOREIGN if re.search(mark, text, re.S)]
+    for program, remedy in own[:1]:
+        raise FileError(
+            "camera-file.foreign", name=name, program=program, remedy=remedy
+        )
 
 
 def colmap_tree(text: str, name: str) -> dict[str, Tree] | None:

@@ -62,6 +62,39 @@ _REASONS = {
 # Errors of file systems without hard links: FAT, some network drives.
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
+AN_IMAGE = "image"
+# How files begin that are none of those read here; the first that fits counts.
+_KINDS = (
+    (rb"#ROSBAG|\x89MCAP", "ROS bag"),
+    (rb"SQLite format 3", "SQLite (bag of ROS 2)"),
+    (rb"MATLAB 5\.0 MAT-file", "MATLAB (.mat)"),
+    (rb"\x89HDF|MATLAB 7\.3|(?s:.{512}\x89HDF)", "HDF5 (.mat, .h5)"),
+    (rb"\x93NUMPY|PK\x03\x04(?s:.{26,40})\.npy", "numpy"),
+    (rb"\x80[\x02-\x05](?s:.{1,12})(\x8c|\}|c)", "Python (pickle)"),
+    (rb"PK\x03\x04|\x1f\x8b|7z\xbc\xaf|Rar!", "archive (.zip, .gz)"),
+    (rb"\x89PNG|\xff\xd8\xff|II\*\0|MM\0\*|BM.{4}\0{4}", AN_IMAGE),
+    (rb"GIF8", "GIF"),
+    (rb"SIMPLE  =", "FITS"),
+    (rb"(?s:.{128})DICM", "DICOM"),
+    (rb"LUCAM-RECORDER", "SER (video)"),
+    (rb"\xed\xfe\0\0N\0o\0r\0p\0i\0x\0", "Norpix sequence"),
+    (rb"CI[\x2c-\x40]\0", "Phantom (.cine)"),
+    (rb"\x76\x2f\x31\x01", "OpenEXR"),
+    (rb".{4}ftyp", "HEIC, AVIF or video"),
+    (rb"%PDF", "PDF"),
+    (rb"[\x02-\x7f]\x50", "C3D"),
+    (rb"version https://git-lfs", "Git LFS (pointer to the file)"),
+    (rb"(?i)\s*<(!doctype )?html", "HTML (a web page)"),
+    (rb"ISO-10303-21", "STEP"),
+    (rb".{72}S {6}1", "IGES"),
+    (rb"\s*0\r?\n\s*SECTION", "DXF"),
+    (rb"(#.*\n|[go] .*\n)*v +[-\d]", "OBJ (surface)"),
+    (rb"ply\r?\n", "PLY (point cloud)"),
+    (rb"solid ", "STL (surface)"),
+    (rb"scorer,", "DeepLabCut (wide table)"),
+)
+HEAD = 1000  # bytes, that tell the kind of a file
+
 _logger = logging.getLogger(__name__)
 
 
@@ -98,6 +131,8 @@ def read_text(path: Path, what: Message, limit: int) -> str:
     old instruments write in comments.
     """
     data = read_bytes(path, what, limit)
+    if kind := kind_of(data):
+        raise FileError("read.kind", what=what, path=path, kind=kind)
     try:
         text = _decode(data)
     except UnicodeDecodeError as error:
@@ -117,6 +152,12 @@ def read_text(path: Path, what: Message, limit: int) -> str:
     if not text.strip():
         raise FileError("read.blank", what=what, path=path)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def kind_of(data: bytes) -> str:
+    """Return the kind of a file that is not read here, from its start, or ``""``."""
+    start = data[:HEAD].removeprefix(BOM_UTF8)
+    return next((kind for mark, kind in _KINDS if re.match(mark, start)), "")
 
 
 def write_whole(path: Path, data: bytes) -> None:

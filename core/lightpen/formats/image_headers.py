@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias
 
 from lightpen.errors import FileError
+from lightpen.formats.files import AN_IMAGE, HEAD, kind_of
 from lightpen.messages import Message
 
 MAX_PIXELS = 70_000_000  # the largest usual sensors have 9344 x 7000
@@ -54,7 +55,7 @@ def read_image_header(stream: BinaryIO, name: str | Message) -> ImageHeader:
 
     Raises `FileError` if the format is not known or the header is damaged.
     """
-    start = stream.read(16)
+    start = stream.read(HEAD)
     stream.seek(0)
     header = _reader(start, name)(stream, name)
     if header.width == 0 or header.height == 0:
@@ -78,6 +79,13 @@ def damaged_image(name: str | Message) -> FileError:
     return FileError("image.damaged", name=name)
 
 
+def _unknown_image(start: bytes, name: str | Message) -> FileError:
+    """Return the error of a file that is of another kind, or damaged."""
+    kind = kind_of(start)
+    known = FileError("image.kind", name=name, kind=kind)
+    return known if kind and kind != AN_IMAGE else damaged_image(name)
+
+
 def cut_off_image(name: str | Message) -> FileError:
     """Return the error of a truncated image."""
     return FileError("image.cut-off", name=name)
@@ -99,7 +107,7 @@ def _reader(start: bytes, name: _Name) -> _Reader:
         return _webp
     if re.match(rb"P[1-6][\s#]", start):
         return _pnm
-    raise damaged_image(name)
+    raise _unknown_image(start, name)
 
 
 def _exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
@@ -211,4 +219,7 @@ def _pnm(stream: BinaryIO, name: _Name) -> ImageHeader:
     channels = 3 if kind in (3, 6) else 1
     bytes_a_value = 2 if brightest > 255 else 1
     decoded = width * height * channels * bytes_a_value
+    stream.seek(head.end() + 1 + decoded)
+    if kind in (5, 6) and re.match(rb"\s*P[56]\s", stream.read(4)):
+        raise animated_image(name)
     return ImageHeader(width, height, decoded, full_scale=brightest)

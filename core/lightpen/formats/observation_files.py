@@ -19,10 +19,9 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, opened, read_text
+from lightpen.formats.files import HEAD, MEGABYTE, read_bytes
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
-    HEAD,
     SEQUENCE_SUFFIXES,
     GivenPoses,
     foreign_poses,
@@ -32,13 +31,21 @@ from lightpen.formats.pose_files import (
     read_sequence,
     refuse_foreign_poses,
 )
-from lightpen.formats.tables import NOTHING, Table, parse_table, read_table
+from lightpen.formats.tables import (
+    NOTHING,
+    Table,
+    is_workbook,
+    parse_table,
+    read_table,
+    table_text,
+)
 from lightpen.messages import Message, message, printable
 from lightpen.model.rigid import nearest_rotation
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
+MANY_CENTERS = 20  # as no program lists only in the corner of an image
 LARGEST_TRANSLATION = 1e6  # mm
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
@@ -51,7 +58,6 @@ _LED = ("led", "led_id", "marker", "marker_id", "id")
 _PIXEL = (("x_px", "x", "u_px", "u"), ("y_px", "y", "v_px", "v"))
 _CENTERS = (_FRAME, _LED, *_PIXEL)
 _UNLABELLED = (_FRAME, *_PIXEL)
-_NOT_SEEN = ([0.0, 0.0], [-1.0, -1.0])  # as programs write centres that they lack
 _POSE = (
     *((f"r{i}{j}",) for i in "123" for j in "123"),
     *((f"t{axis}_mm", f"t{axis}") for axis in "xyz"),
@@ -150,12 +156,14 @@ def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
 def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     """Return centres (N, 2), px; NaN where the table says that there is none."""
     pixels = table.numbers_or_none(columns)
-    nothing = [np.all(pixels == place, axis=1) for place in _NOT_SEEN]
-    return np.where(
-        (np.any(nothing, axis=0) | np.isnan(pixels).any(axis=1))[:, None],
-        np.nan,
-        pixels,
-    )
+    # Programs write (0, 0), (-1, -1), (-9999, -9999) for centres that they lack.
+    x, y = pixels.T
+    nothing = (x == y) & (x <= 0) & (x == np.round(x))
+    seen = np.where((nothing | np.isnan(x + y))[:, None], np.nan, pixels)
+    is_share = np.nanmax(seen, initial=0) <= 1 and np.nanmin(seen, initial=1) >= 0
+    if is_share and len(seen) > MANY_CENTERS:
+        raise FileError("centers.normalised", name=table.name)
+    return seen
 
 
 def read_poses(path: Path, tool: str | None = None) -> PoseTable:
@@ -170,9 +178,10 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
         given = read_sequence(path, tool)
         return _foreign_poses(given, path)
     name = printable(path.name)
-    with opened(path, message("file.poses"), OBSERVATION_FILE_LIMIT) as stream:
-        refuse_foreign_poses(stream.read(HEAD), name)
-    text = read_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
+    data = read_bytes(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
+    if not is_workbook(data):
+        refuse_foreign_poses(data[:HEAD], name)
+    text = table_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     text = motive_table(text, name) if is_motive(text) else text
     if is_own(parse_table(text, name, is_foreign=True)):
         return _own_poses(parse_table(text, name), path)

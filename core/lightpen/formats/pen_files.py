@@ -52,7 +52,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree, parse_json, parse_yaml
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text, write_whole
+from lightpen.formats.files import MEGABYTE, quoted, read_bytes, write_whole
 from lightpen.formats.pen_tables import (
     LARGEST_DIAMETER,
     LENGTHS,
@@ -65,14 +65,12 @@ from lightpen.formats.pen_tables import (
     checked_number,
     csv_text,
     from_table,
-    is_workbook,
     markers_of,
     refuse_foreign_list,
     stated_numbers,
     unit_normal,
-    workbook_text,
 )
-from lightpen.formats.tables import parse_table
+from lightpen.formats.tables import parse_table, table_text
 from lightpen.messages import message, printable
 from lightpen.model.pen import DISC_DIAMETER, Pen, check_frame, check_leds, in_pen_frame
 from lightpen.model.self_calibration import MARK_DIGITS, FoundPen
@@ -347,9 +345,7 @@ def _read(path: Path, units: str | None) -> PenContent:
         )
     data, name = read_bytes(path, PEN_FILE, PEN_FILE_LIMIT), printable(path.name)
     refuse_foreign_list(data, name)
-    if is_workbook(data):
-        return from_table(parse_table(workbook_text(data, name), name), units)
-    text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)
+    text = table_text(path, PEN_FILE, PEN_FILE_LIMIT)
     if path.suffix.lower() in (".yaml", ".yml"):
         return _of_document(parse_yaml(text, name), units, name)
     if text.lstrip().startswith(("{", "[")):

@@ -1,8 +1,6 @@
 """A pen as a table; see `lightpen.formats.pen_files`."""
 
-import io
 import re
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -13,13 +11,15 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.tables import Table, number_flaw
+from lightpen.formats.files import kind_of
+from lightpen.formats.tables import Table, is_workbook, number_flaw
 from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import FoundPen
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
 LARGEST_DIAMETER = 100.0  # mm
+LARGEST_DEVIATION = 0.5  # mm, of a coordinate
 NORMAL_TOLERANCE = 0.01  # of the length of a normal in the file
 _SPELLINGS = {
     "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres"),
@@ -124,9 +124,11 @@ _NOMINAL = " nominal"
 _NORMALS = (("nx",), ("ny",), ("nz",))
 _COLUMN = (
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
-    r"(?:[\s_]*(act|actual|meas|measured|ist)|[\s_]*(nom|nominal|soll))?"
+    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value))?"
+    r"(?:[\s_]*(actual|act|measured|meas|ist)|[\s_]*(nominal|nom|soll))?"
     r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
+_OTHER_COORDINATE = r"[xyz]\b(?! nominal|.*(tol|dev|diff|abw|err|sigma|std))"
 
 
 def from_table(table: Table, units: str | None) -> PenContent:
@@ -136,7 +138,8 @@ def from_table(table: Table, units: str | None) -> PenContent:
     """
     table, row_of_units = _without_units(table)
     named = [_name_and_unit(column) for column in table.header]
-    if not any(name in ("x", "y", "z") for name, _ in named):
+    others = [name for name, _ in named if re.match(_OTHER_COORDINATE, name)]
+    if not others and not any(name in ("x", "y", "z") for name, _ in named):
         # Nominal coordinates are better than none.
         named = [(name.removesuffix(_NOMINAL), unit) for name, unit in named]
     if row_of_units:
@@ -148,13 +151,15 @@ def from_table(table: Table, units: str | None) -> PenContent:
         raise FileError("pen-file.mixed-units", name=table.name, one=one, other=other)
     unit = agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
-    with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
+    with_normals = "nx" in bare.header or _has_normals(bare)
+    if not bare.header and bare.n_columns == 7 and not with_normals:
+        bare = replace(bare, rows=[row[:4] for row in bare.rows])
     names: tuple[str, ...] = _LED_NAMES
     if not any(name in names for name in bare.header) and bare.header[:1] != ("x",):
         names += bare.header[:1]  # what a measuring program calls its elements
     wanted = [names, *_COORDINATES, *(_NORMALS if with_normals else ())]
     columns = bare.columns(wanted, message("table.of-leds"))
-    _check_numbering(table, columns[0])
+    table = _in_number_order(table, columns[0])
     numbers = table.numbers(columns[1:])
     diameter = None
     if "diameter" in bare.header:
@@ -177,6 +182,14 @@ def from_table(table: Table, units: str | None) -> PenContent:
     return PenContent(numbers[:, :3] * UNITS[unit], normals, diameter, stated=further)
 
 
+def _has_normals(table: Table) -> bool:
+    """Return whether 7 columns without names end in normals, not in deviations."""
+    if table.header or table.n_columns != 7:
+        return False
+    last = table.numbers(range(4, 7))
+    return not np.all((last > 0) & (last < LARGEST_DEVIATION))
+
+
 def _name_and_unit(column: str) -> tuple[str, str]:
     """Return the name of a column without its unit, and the unit or an empty string."""
     match = re.fullmatch(_COLUMN, column)
@@ -197,33 +210,31 @@ def _without_units(table: Table) -> tuple[Table, list[str]]:
     return replace(table, rows=table.rows[1:], lines=table.lines[1:]), first
 
 
-def _check_numbering(table: Table, column: int) -> None:
-    """Refuse LEDs that are not numbered 1, 2, 3 and so on from row to row.
+def _in_number_order(table: Table, column: int) -> Table:
+    """Return a table with its LEDs in the order of their numbers, from 1 without gaps.
 
     Names without numbers, or numbers from 0 in names, are in order.
     """
     cells = [row[column] for row in table.rows]
     numbered = [cell for cell in cells if not cell or re.search(r"(?a)\d$", cell)]
     if not numbered and len(set(cells)) == len(cells):
-        return
+        return table
     numbers = table.whole_numbers(column)
-    if number_flaw(cells[0]) and numbers[0] == 0:
+    if number_flaw(cells[0]) and numbers.min() == 0:
         numbers += 1
-    wrong = numbers != np.arange(1, len(numbers) + 1)
-    if not np.any(wrong):
-        return
-    row = int(np.argmax(wrong))
-    found, needed = int(numbers[row]), row + 1
-    earlier = np.flatnonzero(numbers[:row] == found)
-    if len(earlier):
-        flaw = message("pen-file.listed-twice", led=found, line=table.lines[earlier[0]])
-    elif needed in numbers:
-        flaw = message(
-            "pen-file.out-of-order", led=found, needed=needed, n_leds=len(numbers)
-        )
-    else:
-        flaw = message("pen-file.gap", led=found, needed=needed)
-    raise table.error(row, flaw)
+    order = np.argsort(numbers, kind="stable")
+    in_order = numbers[order]
+    wrong = np.flatnonzero(in_order != np.arange(1, len(numbers) + 1))
+    if not len(wrong):
+        return table.only(order.tolist())
+    twice = np.flatnonzero(np.diff(in_order) == 0)
+    if len(twice):
+        first, second = map(int, order[twice[0] : twice[0] + 2])
+        led, line = int(numbers[first]), table.lines[first]
+        raise table.error(second, message("pen-file.listed-twice", led=led, line=line))
+    led = int(in_order[wrong[0]])
+    flaw = message("pen-file.gap", led=led, needed=int(wrong[0]) + 1)
+    raise table.error(int(order[wrong[0]]), flaw)
 
 
 def _common(table: Table, column: int, bare: Table) -> float:
@@ -266,7 +277,6 @@ def csv_text(pen: Pen) -> str:
 # name. A document that has nothing but points is such a list.
 
 
-LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
 # Where programs list markers, and in what unit if they always use the same.
 LISTS = (
     ("marker_positions", "m"),  # rpg_monocular_pose_estimator
@@ -281,15 +291,13 @@ LISTS = (
 )
 _PLACES = ("position", "pos", "xyz", "location", "offset", "coordinates")
 _NORMAL_FIELDS = ("normal", "direction", "dir")
+_IDS = ("id", "led", "number", "name", "label", "marker")
 _AXES = ("x", "y", "z")
-_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")  # xlsx and ods; xls
 _ROM = b"NDI\x00"
 _FOREIGN = (  # how files begin that cannot be read
     (rb"\s*<", "XML (Motive, Vicon)"),
-    (rb"ply\r?\n", "PLY (point cloud)"),
     (rb"\s*Format Version,", "Motive (CSV)"),
     (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
-    (rb"solid ", "STL (surface)"),
     (rb"# Markups fiducial|\s*{\s*\"@schema\"", "3D Slicer (markups)"),
 )
 
@@ -302,54 +310,21 @@ class Markers(NamedTuple):
     unit: str  # empty if it does not go without saying
 
 
-def is_workbook(data: bytes) -> bool:
-    """Return whether the content of a file is that of a workbook."""
-    return data.startswith(_WORKBOOKS)
-
-
 def refuse_foreign_list(data: bytes, name: str) -> None:
     """Refuse the file of a program whose points cannot be read, by name."""
     if data.startswith(_ROM):
         raise FileError("pen-file.rom", name=name)
-    for start, program in _FOREIGN:
-        if re.match(start, data.removeprefix(b"\xef\xbb\xbf")):
-            raise FileError("pen-file.foreign", name=name, program=program)
-
-
-def workbook_text(data: bytes, name: str) -> str:
-    """Return the first sheet of a workbook with a table, as lines with tabs."""
-    try:
-        from python_calamine import CalamineError, CalamineWorkbook
-    except ImportError as error:
-        raise FileError("pen-file.no-workbooks", name=name) from error
-    try:
-        if data.startswith(b"PK"):
-            with zipfile.ZipFile(io.BytesIO(data)) as packed:
-                size = sum(each.file_size for each in packed.infolist())
-            if size > LARGEST_WORKBOOK:
-                raise FileError("pen-file.large-workbook", name=name)
-        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
-        for index in range(len(book.sheet_names)):
-            rows = book.get_sheet_by_index(index).to_python(skip_empty_area=True)
-            rows = [row for row in rows if any(cell != "" for cell in row)]
-            if sum(len(row) - row.count("") >= len(_AXES) for row in rows) > 1:
-                return "".join("\t".join(map(_cell, row)) + "\n" for row in rows)
-    except (CalamineError, zipfile.BadZipFile, OSError, ValueError) as error:
-        raise FileError("pen-file.damaged-workbook", name=name) from error
-    raise FileError("table.no-rows", name=name)
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
-        return str(int(value))
-    return " ".join(str(value).split())
+    start = data.removeprefix(b"\xef\xbb\xbf")
+    own = next((program for mark, program in _FOREIGN if re.match(mark, start)), "")
+    if program := own or kind_of(b"" if is_workbook(data) else data):
+        raise FileError("pen-file.foreign", name=name, program=program)
 
 
 def markers_of(tree: Tree, name: str) -> Markers | None:
     """Return the points of a document of another program; None if it lists none."""
     own = _in_order(tree) if isinstance(tree, dict) else tree
     if isinstance(own, list) and len(own) > 2 and all(map(_is_point, own)):
-        return _markers(own, "", name)
+        return _markers(_by_id(own), "", name)
     if not isinstance(tree, dict):
         return None
     for path, unit in LISTS:
@@ -364,7 +339,7 @@ def markers_of(tree: Tree, name: str) -> Markers | None:
         if isinstance(found, dict):
             found = _in_order(found)
         if isinstance(found, list) and found:
-            return _markers(found, unit, name)
+            return _markers(_by_id(found), unit, name)
     return None
 
 
@@ -378,10 +353,20 @@ def _in_order(points: dict[str, Tree]) -> list[Tree]:
     return [values[i] for i in np.argsort(numbers, kind="stable")]
 
 
+def _by_id(points: list[Tree]) -> list[Tree]:
+    """Return points in the order of their numbers, if each has its own."""
+    each = [point for point in points if isinstance(point, dict)]
+    ids = [str(point[key]) for point in each for key in _IDS if key in point]
+    if len(set(ids)) < len(points) or len(ids) > len(points):
+        return points
+    return _in_order(dict(zip(ids, points, strict=True)))
+
+
 def _is_point(value: Tree) -> bool:
-    """Return whether a value is three numbers, or has x, y and z."""
+    """Return whether a value is three numbers, or has x, y and z or a place."""
     if isinstance(value, dict):
-        return set(_AXES) <= {str(key).casefold() for key in value}
+        names = {str(key).casefold() for key in value}
+        return set(_AXES) <= names or not names.isdisjoint(_PLACES)
     return isinstance(value, list) and len(value) == len(_AXES)
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import opened
+from lightpen.formats.files import kind_of, opened
+from lightpen.formats.pen_tables import UNIT_NAMES, UNITS
 from lightpen.formats.tables import Table
 from lightpen.messages import Message, message, printable
 
@@ -39,16 +40,15 @@ METRES_BELOW = 10.0  # mm of a typical translation; no pen is as close to its tr
 FEW_POSES = 4
 UNIT_TOLERANCE = 0.01  # of the length of a quaternion
 
-_UNITS = {"m": 1000.0, "mm": 1.0, "cm": 10.0, "meters": 1000.0, "millimeters": 1.0}
 _UNIT = (
-    r"(?:(?:[\s_.]+[\[(]?|[\[(])(mm|cm|m|meters|millimeters)[\])]?"
-    r"|\s*[\[(][^\])]*[\])])$"
+    rf"(?:(?:[\s_.]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
+    r"|\s*[\[(]([^\])]*)[\])])$"
 )
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
 _SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}
 _VECTORS = {"rvec", "rotvec", "rodrigues"}
-_EULER = {"roll", "pitch", "yaw"}
+_ANGLE = r"(euler_?|rot_?)?(roll|pitch|yaw|r?[xyz]|[abc])([\W_]+(deg|rad)\w*\W?)?"
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
 _STATE = r".*(state|status|valid|visible|visibility|tracked).*"
 _FLAG = r"valid|visib|tracked"  # 0 says no; as a state, it may say that all is well
@@ -113,7 +113,7 @@ def is_lost(state: str, column: str = "") -> bool:
 def _role(name: str) -> _Role | None:
     stated = re.search(_UNIT, name)
     base = re.sub(_UNIT, "", name).strip()
-    unit = _UNITS.get(stated[1] or "") if stated else None
+    unit = UNITS[UNIT_NAMES[stated[1]]] if stated and stated[1] else None
     stem, axis = re.sub(r"[^a-z0-9]+$", "", base[:-1]), base[-1:]
     words = set(re.findall(r"[a-z]+", stem))
     tool = re.sub(r"[\W_]*(" + "|".join(_ROTATING | _MOVING) + r")$", "", stem)
@@ -145,9 +145,8 @@ def _tool(
     vector = [places.get(("v", axis)) for axis in "xyz"]
     translation = [places.get(("t", axis)) for axis in "xyz"]
     if None in translation or (None in quaternion and None in vector):
-        if None not in translation and (
-            None not in quaternion[1:] or set(table.header) >= _EULER
-        ):
+        angles = [name for name in table.header if re.fullmatch(_ANGLE, name)]
+        if None not in translation and (None not in quaternion[1:] or len(angles) > 2):
             raise FileError("poses.angles", name=table.name)
         return None
     role = roles[translation[0] or 0]
@@ -296,13 +295,11 @@ SEQUENCE_LIMIT = 10**12  # bytes; pixels are not read
 LONGEST_HEADER = 64_000_000  # bytes
 NOTHING_BELOW = -1e20  # NDI writes -3.7e28 for what it does not see
 MAX_TOOLS = 20
-HEAD = 1000  # bytes, that tell the form of a file
 
 _FOREIGN = (
     (r"\A\s*\[\[[^,\]]*\]", "numpy (display)"),
     (r"\A\s*[\[{]", "JSON"),
-    (r"\A(\x93NUMPY|PK\x03\x04)", "numpy"),
-    (r"\A\x89HDF", "HDF5"),
+    (r"\Afr \d+\s*\n(ts|6d)", "DTrack (ART)"),
     (r"\A\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\S+[ \t]+){3}\S+[ \t]*\n", "Open3D (.log)"),
     (r"\A#Insight Transform", "ITK"),
     (r"\ANO_OF_FRAMES", "Qualisys Track Manager (6D)"),
@@ -329,9 +326,9 @@ class GivenPoses:
 def refuse_foreign_poses(head: bytes, name: str) -> None:
     """Refuse poses in a form that is not read, by its name."""
     text = head.decode("latin-1").removeprefix("\xef\xbb\xbf")
-    for pattern, program in _FOREIGN:
-        if re.search(pattern, text):
-            raise FileError("poses.foreign", name=name, program=program)
+    own = next((program for mark, program in _FOREIGN if re.search(mark, text)), "")
+    if program := own or kind_of(head):
+        raise FileError("poses.foreign", name=name, program=program)
 
 
 def is_own(table: Table) -> bool:

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 import re
+import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -14,7 +15,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import quoted, read_text
+from lightpen.formats.files import quoted, read_bytes, read_text
 from lightpen.messages import Message, message, printable
 
 MAX_LINES = 300_000  # 0.2 GB while they are read
@@ -22,8 +23,23 @@ MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of LED numbers
 LARGEST_MOMENT = 2**63 - 1  # of frame numbers: nanoseconds have 19 digits
 DECIMALS = 9  # of times
+LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
+FEWEST_CELLS = 3  # of a row of a table in a workbook
 NOTHING = frozenset(
-    {"", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "-", "--", "missing"}
+    {
+        "",
+        "nan",
+        "na",
+        "n/a",
+        "#n/a",
+        "#nv",
+        "none",
+        "null",
+        "-",
+        "--",
+        "missing",
+        *("inf", "-inf", "infinity"),
+    }
 )
 
 # No digit can match in two ways, so that mismatches are found without backtracking.
@@ -32,7 +48,8 @@ _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
 _COMMENT = "#%"  # of MATLAB, too
 _CELL = r"[^\s;,]"  # lines of a spreadsheet may have none
-_IN_BRACKETS = r"\s*[\[(].*[\])]$"  # a unit
+_JSON = r"\s*[\[{]\s*[\"{\[]"
+_IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
 _LED_NAME = r"(?a)^[^\W\d_].*?(?=\d+$)"
 _FRAME_NAME = r"(?a)[^\W\d].*?(\d+)(\.[a-z]+)?"
 _DATE = r"(?a)\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?"
@@ -184,7 +201,51 @@ def read_table(path: Path, what: Message, limit: int) -> Table:
     have decimal commas unless the comma separates columns. Blank lines and lines that
     begin with ``#`` are skipped. A first line without numbers is a header.
     """
-    return parse_table(read_text(path, what, limit), printable(path.name))
+    return parse_table(table_text(path, what, limit), printable(path.name))
+
+
+def table_text(path: Path, what: Message, limit: int) -> str:
+    """Return the text of a table; of a workbook, its first sheet with one."""
+    data = read_bytes(path, what, limit)
+    if is_workbook(data):
+        return _workbook_text(data, printable(path.name))
+    return read_text(path, what, limit)
+
+
+def is_workbook(data: bytes) -> bool:
+    """Return whether the content of a file is that of a workbook: xlsx, ods or xls."""
+    parts = (b"xl/workbook", b"content.xml")
+    is_packed = data.startswith(b"PK\x03\x04") and any(each in data for each in parts)
+    return is_packed or data.startswith(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
+
+
+def _workbook_text(data: bytes, name: str) -> str:
+    """Return the first sheet of a workbook with a table, as lines with tabs."""
+    try:
+        from python_calamine import CalamineError, CalamineWorkbook
+    except ImportError as error:
+        raise FileError("workbook.no-reader", name=name) from error
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as packed:
+                size = sum(each.file_size for each in packed.infolist())
+            if size > LARGEST_WORKBOOK:
+                raise FileError("workbook.large", name=name)
+        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+        for index in range(len(book.sheet_names)):
+            rows = book.get_sheet_by_index(index).to_python(skip_empty_area=True)
+            rows = [row for row in rows if any(cell != "" for cell in row)]
+            if sum(len(row) - row.count("") >= FEWEST_CELLS for row in rows) > 1:
+                return "".join("\t".join(map(_cell, row)) + "\n" for row in rows)
+    except (CalamineError, zipfile.BadZipFile, OSError, ValueError) as error:
+        raise FileError("workbook.damaged", name=name) from error
+    raise FileError("table.no-rows", name=name)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
+        return str(int(value))
+    return " ".join(str(value).split())
 
 
 def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
@@ -193,6 +254,8 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     A foreign table may have columns of the same name, short lines, and its header in a
     comment.
     """
+    if re.match(_JSON, text):
+        raise FileError("table.json", name=name)
     lines = _filled_lines(text, name)
     separator = _separator([line for _, line in lines])
     hint = re.fullmatch(r"sep=([;,\t|])\s*", lines[0][1])  # of Excel, to itself

@@ -5215,14 +5215,6 @@
         <translation>LED {led} 已在第 {line} 行列出。</translation>
     </message>
     <message>
-        <source>LED {led} is listed at the position of LED {needed}, and LED {needed} is missing. Number the LEDs from 1 without gaps.</source>
-        <translation>LED {led} 列在 LED {needed} 的位置，且缺少 LED {needed}。请从 1 开始连续编号。</translation>
-    </message>
-    <message>
-        <source>LED {led} is listed at the position of LED {needed}. List the LEDs from 1 to {n_leds} in ascending order.</source>
-        <translation>LED {led} 列在 LED {needed} 的位置。请按 1 到 {n_leds} 升序列出 LED。</translation>
-    </message>
-    <message>
         <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; its weight is reduced accordingly. Clean it, and check its brightness and its supply.</source>
         <translation>LED {led} 的噪声高于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；已相应降低其权重。请清洁它，并检查亮度和供电。</translation>
     </message>
@@ -5241,6 +5233,10 @@
     <message>
         <source>LED {led} of {name} has no normal, but others have. Give the normals of all LEDs or of none.</source>
         <translation>{name} 的 LED {led} 没有法向量，而其他 LED 有。请给出全部法向量，或都不给。</translation>
+    </message>
+    <message>
+        <source>LED {led} stands where LED {needed} is expected. Number the LEDs from 1 without gaps.</source>
+        <translation>应为 LED {needed} 的位置是 LED {led}。请将 LED 从 1 起连续编号。</translation>
     </message>
     <message>
         <source>LEDs do not fit</source>
@@ -5791,6 +5787,10 @@
         <translation>{name} 的 {what} 不是协方差矩阵：它必须对称且没有负方差。请更正或删除。</translation>
     </message>
     <message>
+        <source>The {what} {path} is a file of the kind {kind}, which is not read. Export its content as text, in a form that the documents list under input files.</source>
+        <translation>{what} {path} 是 {kind} 类型的文件，无法读取。请将其内容导出为文本，格式见文档的“输入文件”一节。</translation>
+    </message>
+    <message>
         <source>There is a file of that name already. Try again.</source>
         <translation>已有同名文件。请重试。</translation>
     </message>
@@ -6127,6 +6127,10 @@
         <translation>{name}</translation>
     </message>
     <message>
+        <source>{name} begins with {start} and has no named values, as YAML, JSON, XML and TOML have them. Check that this is the right file, or write what it holds in one of these forms.</source>
+        <translation>{name} 以 {start} 开头，没有 YAML、JSON、XML 和 TOML 那样的命名值。请检查文件是否正确，或将其内容写成这些格式之一。</translation>
+    </message>
+    <message>
         <source>{name} contains more than one YAML document. Keep one of them.</source>
         <translation>{name} 含有多个 YAML 文档。请只保留一个。</translation>
     </message>
@@ -6189,10 +6193,6 @@
     <message>
         <source>{name} has only comments. Check that it is complete.</source>
         <translation>{name} 只有注释。请检查其是否完整。</translation>
-    </message>
-    <message>
-        <source>{name} has rotations as three angles, whose order is not certain. Export the rotations as quaternions or matrices.</source>
-        <translation>{name} 的旋转为三个角度，其顺序不确定。请将旋转导出为四元数或矩阵。</translation>
     </message>
     <message>
         <source>{name} has rotations that are none: quaternions need the length 1, and the rows of matrices the length 1 at right angles. Export the poses again.</source>
@@ -6283,10 +6283,6 @@
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
     </message>
     <message>
-        <source>{name} is no workbook with a sheet that can be read. Save the sheet with the LEDs as CSV.</source>
-        <translation>{name} 不是含有可读工作表的工作簿。请将含 LED 的工作表另存为 CSV。</translation>
-    </message>
-    <message>
         <source>{name} is not valid TOML ({problem}). The file may be cut short: copy or export it again.</source>
         <translation>{name} 不是有效的 TOML（{problem}）。文件可能被截断：请重新复制或导出。</translation>
     </message>
@@ -6297,10 +6293,6 @@
     <message>
         <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
         <translation>{name} 为 {width} × {height} px，其他图像为 {usual_width} × {usual_height} px。请只回放同一台相机的图像。</translation>
-    </message>
-    <message>
-        <source>{name} unpacks to more than 50 MB. Save the sheet with the LEDs as CSV.</source>
-        <translation>{name} 解压后超过 50 MB。请将含 LED 的工作表另存为 CSV。</translation>
     </message>
     <message>
         <source>{name}: U (k = 2) is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm. Probe more points, and lay a length across the view.</source>
@@ -6733,10 +6725,6 @@
     <message>
         <source>{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.</source>
         <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，或关闭像素合并和裁剪。</translation>
-    </message>
-    <message>
-        <source>{name} begins with {start} and has no named values, as YAML, JSON, XML and TOML have them. Check that this is the right file.</source>
-        <translation>{name} 以 {start} 开头，不含 YAML、JSON、XML 或 TOML 那样的带名称的值。请检查文件是否正确。</translation>
     </message>
     <message>
         <source>{name} cannot be decoded.</source>
@@ -7383,6 +7371,10 @@
         <translation>各姿态下该点的（最大 - 最小）/ 2：u {u:.4f}，v {v:.4f}，w {w:.4f} mm。</translation>
     </message>
     <message>
+        <source>All centres in {name} are between 0 and 1: they seem to be shares of the image. Write them in pixels, (0, 0) being the centre of the first.</source>
+        <translation>{name} 中的所有中心都在 0 与 1 之间：它们似乎是占图像的比例。请以像素为单位写出，(0, 0) 为第一个像素的中心。</translation>
+    </message>
+    <message>
         <source>An LED file needs one known length. Measure the distance between two LEDs and state it.</source>
         <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距。</translation>
     </message>
@@ -7401,6 +7393,10 @@
     <message>
         <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
         <translation>它是整个项目：请通过 Tools、Camera Calibration、Save 将这一台相机的标定保存为 XML。</translation>
+    </message>
+    <message>
+        <source>It names the files of its cameras: choose that of the camera that observes the pen.</source>
+        <translation>它列出了各相机的文件：请选择观测光笔的相机的文件。</translation>
     </message>
     <message>
         <source>Its distortion is not that of OpenCV or of Kannala and Brandt: calibrate the camera from the images of its board, here or with one of these models.</source>
@@ -8359,6 +8355,10 @@
         <translation>{name} 的镜头残差场有 {columns:g} 列、{rows:g} 行；行列各需 2 至 {most}。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
+        <source>{name} has rotations as three numbers, which may be angles in any order. Export the rotations as quaternions or matrices; name the columns of a rotation vector in radians rvec_x,rvec_y,rvec_z.</source>
+        <translation>{name} 用三个数表示旋转，可能是任意顺序的角度。请将旋转导出为四元数或矩阵；若为以弧度表示的旋转向量，请将各列命名为 rvec_x,rvec_y,rvec_z。</translation>
+    </message>
+    <message>
         <source>{name} has the distortion model {model}, which is not supported. Calibrate the camera again with plumb_bob (radtan), rational_polynomial or equidistant.</source>
         <translation>{name} 的畸变模型 {model} 不受支持。请用 plumb_bob (radtan)、rational_polynomial 或 equidistant 重新标定相机。</translation>
     </message>
@@ -8371,8 +8371,24 @@
         <translation>{name} 有 {counted}；鱼眼模型需要 4 个（k1 k2 k3 k4）。请重新导出该文件。</translation>
     </message>
     <message>
+        <source>{name} is JSON, where a table is read. Write it as CSV, with a header and a line for each row.</source>
+        <translation>{name} 是 JSON，而此处读取的是表格。请写成 CSV，带表头，每行一条。</translation>
+    </message>
+    <message>
+        <source>{name} is a file of the kind {kind}, from which no images are read. Save the images as PNG or TIFF.</source>
+        <translation>{name} 是 {kind} 类型的文件，无法从中读取图像。请将图像保存为 PNG 或 TIFF。</translation>
+    </message>
+    <message>
+        <source>{name} is no workbook with a sheet that can be read. Save the sheet with the table as CSV.</source>
+        <translation>{name} 不是含可读工作表的工作簿。请将含表格的工作表另存为 CSV。</translation>
+    </message>
+    <message>
         <source>{name} is not valid YAML. Check that this is the right file.</source>
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} unpacks to more than 50 MB. Save the sheet with the table as CSV.</source>
+        <translation>{name} 解压后超过 50 MB。请将含表格的工作表另存为 CSV。</translation>
     </message>
     <message>
         <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>

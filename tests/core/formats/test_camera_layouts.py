@@ -185,6 +185,38 @@ PLAIN: dict[str, Any] = {
     **dict(zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True)),
     **dict(zip(("k1", "k2", "p1", "p2"), BROWN, strict=True)),
 }
+SVO = f"""label: "a"
+cameras:
+- camera:
+    image_height: 720
+    image_width: 1280
+    type: pinhole
+    intrinsics:
+      cols: 1
+      rows: 4
+      data: {[*PINHOLE]}
+    distortion:
+      type: radial-tangential
+      parameters:
+        cols: 1
+        rows: 4
+        data: {[*BROWN]}
+"""
+NUMBERS = dict(
+    zip(["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"], PINHOLE + BROWN, strict=True)
+)
+BASALT = {
+    "value0": {
+        "T_imu_cam": [{"px": 0}],
+        "intrinsics": [
+            {
+                "camera_type": "pinhole-radtan8",
+                "intrinsics": NUMBERS | {"k3": 0, "k4": 0, "rpmax": 2.7},
+            }
+        ],
+        "resolution": [[*SIZE]],
+    }
+}
 ZIVID = f"""__version__: 1
 image_width: 1280
 image_height: 720
@@ -230,6 +262,16 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(ORB_SLAM, id="ORB-SLAM"),
         pytest.param(ORB_SLAM.replace("Camera1.", "Camera."), id="ORB-SLAM 2"),
         pytest.param(ZIVID, id="Zivid"),
+        pytest.param(SVO, id="SVO"),
+        pytest.param(BASALT, id="Basalt"),
+        pytest.param(
+            {"camera_res": SIZE, "cameraMatrix": MATRIX, "distortion": [BROWN]},
+            id="resolution of a camera",
+        ),
+        pytest.param(
+            {"w": 1280, "h": 720, "K": [*zip(*MATRIX, strict=True)], "D": BROWN},
+            id="by columns",
+        ),
         pytest.param(PLAIN, id="names alone"),
         pytest.param({"camera": PLAIN}, id="within a name"),
         pytest.param(
@@ -367,7 +409,14 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("<x:xmpmeta xmlns:x='adobe:ns:meta/'></x:xmpmeta>", "RealityCapture"),
         ("ParGroup: Camera: Parameter;\n\nFocus:foc: 0.016;\n", "Halcon"),
         ({"camera": "area_scan_polynomial", "focus": 0.016}, "Halcon"),
-        ({"value0": {"T_imu_cam": [], "intrinsics": []}}, "Basalt"),
+        ("NVM_V3 \n\n2\na.jpg 4640 1 0 0 0 0 0 0 -0.08 0\n", "VisualSFM"),
+        ("RadTan 464 464 123 101 -.1 .1 0 0\n244 204\ncrop\n2 2\n", "DSO"),
+        ("[CAMERA_PARAMS]\nresolution=[640 480]\ncx=320\n", "MRPT"),
+        ("P0: 718.8 0 607.1 0 0 718.8 185.2 0 0 0 1 0\n", "KITTI"),
+        ("<ExportAPERO><F>1127</F></ExportAPERO>", "MicMac"),
+        ("cam0_calib: cam0_mei.yaml\n", "choose that of the camera"),
+        ("<!DOCTYPE html>\n<html><body>404</body></html>", "a web page"),
+        ("version https://git-lfs.github.com/spec/v1\n", "Git LFS"),
         ({"v2 brown": {"projection_type": "brown", "focal_x": 0.7}}, "OpenSfM"),
         ({"boardName": "OAK-D", "cameraData": []}, "DepthAI (OAK-D)"),
         ("#polynomial coefficients for the DIRECT mapping function\n\n5 -46", "OCam"),

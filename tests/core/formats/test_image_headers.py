@@ -74,15 +74,35 @@ def test_a_header_that_ends_early_is_damaged(name: str) -> None:
     "data",
     [
         b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(100),  # JPEG 2000
-        b"\0\0\0\x1cftypavif" + bytes(100),
-        b"GIF89a" + bytes(100),
-        b"v/1\x01" + bytes(100),  # OpenEXR
         b"not an image at all",
     ],
 )
 def test_a_format_whose_size_is_not_known_here_is_refused(data: bytes) -> None:
     with pytest.raises(FileError, match="not a supported image"):
         header_of(data)
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"\0\0\0\x1cftypavif" + bytes(100), "HEIC, AVIF"),
+        (b"GIF89a" + bytes(100), "GIF"),
+        (b"v/1\x01" + bytes(100), "OpenEXR"),
+        (b"SIMPLE  =                    T" + bytes(100), "FITS"),
+        (bytes(128) + b"DICM" + bytes(100), "DICOM"),
+        (b"LUCAM-RECORDER" + bytes(200), "SER"),
+    ],
+)
+def test_a_file_of_images_of_another_kind_is_named(data: bytes, kind: str) -> None:
+    with pytest.raises(FileError, match=f"of the kind {kind}.*Save the images as PNG"):
+        header_of(data)
+
+
+def test_several_images_in_one_pgm_are_not_taken_for_one() -> None:
+    one = b"P5\n4 3\n255\n" + bytes(12)
+    assert header_of(one).width == 4
+    with pytest.raises(FileError, match="Save its images one by one"):
+        header_of(one + one)
 
 
 def test_a_png_with_a_header_of_two_bytes_is_damaged() -> None:

@@ -107,7 +107,7 @@ def test_a_workbook_that_is_not_read_is_named(
 
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as packed:
-        packed.writestr("xl/worksheets/sheet1.xml", bytes(60_000_000))
+        packed.writestr("xl/workbook.xml", bytes(60_000_000))
     path.write_bytes(bomb.getvalue())
     with pytest.raises(FileError, match="unpacks to more than 50 MB"):
         read_pen(path)
@@ -142,6 +142,12 @@ def cmm(columns: str, values: str, units: str = "") -> str:
         ),
         ("X actual [mm];Y actual [mm];Z actual [mm]", "{x};{y};{z}", ""),
         ("X;Y;Z", "{x};{y};{z}", ";[mm];[mm];[mm]"),
+        (
+            "X nominal;X actual;Y nominal;Y actual;Z nominal;Z actual",
+            "{nx};{x};{ny};{y};{nz};{z}",
+            ";mm;mm;mm;mm;mm;mm",
+        ),
+        ("X-Koordinate;Y-Koordinate;Z-Koordinate", "{x};{y};{z}", ";mm;mm;mm"),
     ],
 )
 def test_the_actual_coordinates_of_a_report_are_taken(
@@ -150,6 +156,20 @@ def test_the_actual_coordinates_of_a_report_are_taken(
     path = saved(tmp_path, cmm(columns, values, units))
 
     np.testing.assert_allclose(read_pen(path).leds, ACTUAL, atol=6e-5)
+
+
+def test_nominal_coordinates_beside_others_are_not_taken(tmp_path: Path) -> None:
+    columns = "X nominal;X best fit;Y nominal;Y best fit;Z nominal;Z best fit"
+    text = cmm(columns, "{nx};{x};{ny};{y};{nz};{z}", ";mm;mm;mm;mm;mm;mm")
+    with pytest.raises(FileError, match="has no column x"):
+        read_pen(saved(tmp_path, text), units="mm")
+
+
+def test_deviations_after_coordinates_are_no_normals(tmp_path: Path) -> None:
+    points = enumerate(LEDS.tolist(), 1)
+    text = "".join(f"LED{i} {x} {y} {z} 0.003 0.004 0.005\n" for i, (x, y, z) in points)
+
+    np.testing.assert_array_equal(read_pen(saved(tmp_path, text), "mm").leds, LEDS)
 
 
 def test_nominal_coordinates_alone_are_taken(tmp_path: Path) -> None:
@@ -167,7 +187,7 @@ def test_nominal_coordinates_alone_are_taken(tmp_path: Path) -> None:
         ([f"P{i}" for i in range(10)], ""),
         ([f"Pen:Marker {i}" for i in range(1, 11)], ""),
         (list("ABCDEFGHIJ"), ""),
-        ([f"LED{i}" for i in (1, 3, 2, 4, 5, 6, 7, 8, 9, 10)], "LED 3 is listed"),
+        ([f"LED{i}" for i in (1, 3, 2, 4, 5, 6, 7, 8, 9, 11)], "LED 11 stands"),
         (["LED1", *[f"LED{i}" for i in range(1, 10)]], "listed already"),
         (["A", "A", *"CDEFGHIJ"], "not a number"),
         (["A", "LED2", *"CDEFGHIJ"], "not a number"),
@@ -208,6 +228,13 @@ MAPPINGS = [dict(zip("xyz", point, strict=True)) for point in POINTS]
             },
         },
         {"units": "mm", "points": [{"position": point} for point in POINTS]},
+        {
+            "units": "mm",
+            "points": [
+                {"id": i, "position": point}
+                for i, point in reversed([*enumerate(POINTS, 1)])
+            ],
+        },
     ],
 )
 def test_lists_of_markers_are_read(tmp_path: Path, document: dict[str, Any]) -> None:

@@ -88,7 +88,8 @@ def test_centres_are_sorted_by_frame_and_led(
 
 
 @pytest.mark.parametrize(
-    "unseen", ["-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A"]
+    "unseen",
+    ["-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999", "inf,inf"],
 )
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
     tmp_path: Path, unseen: str
@@ -99,6 +100,15 @@ def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
 
     nan = [np.nan, np.nan]
     np.testing.assert_array_equal(found.pixels, [[[1.5, 2.5], nan, [5, 6]]])
+
+
+def test_shares_of_an_image_are_no_pixels(tmp_path: Path) -> None:
+    rows = [f"{n},1,{0.4 + n / 100},0.5" for n in range(30)]
+    assert "shares of the image" in refusal_of_centers(tmp_path, HEADER, *rows)
+
+
+def test_json_is_named_where_a_table_is_read(tmp_path: Path) -> None:
+    assert "is JSON" in refusal_of_centers(tmp_path, '[{"frame": 1, "leds": []}]')
 
 
 def test_times_are_frames(tmp_path: Path) -> None:

@@ -186,11 +186,11 @@ def test_normals_in_few_digits_get_unit_length(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("2,-0.2", "3,-0.2", "Line 3 of leds.csv: LED 3 is listed at the position"),
+        ("2,-0.2", "3,-0.2", "Line 4 of leds.csv: LED 3 is listed already on line 3"),
         ("\n3,", "\n2,", "Line 4 of leds.csv: LED 2 is listed already on line 3"),
-        ("\n1,", "\n0,", "Line 2 of leds.csv: LED 0 is listed at the position"),
+        ("\n1,", "\n0,", "Line 2 of leds.csv: LED 0 stands where LED 1 is expect"),
         ("\n3,", "\n2.5,", 'Line 4 of leds.csv: "2.5" is not a whole number'),
-        ("10,24.9", "11,24.9", "LED 10 is missing. Number the LEDs from 1 without"),
+        ("10,24.9", "11,24.9", "LED 11 stands where LED 10 is expected. Number the"),
         ("60.1", "6O.1", 'Line 3 of leds.csv: "6O.1" is not a number'),
         ("60.1", "nan", 'Line 3 of leds.csv: "nan" is not a finite number'),
         ("60.1", "1e400", 'Line 3 of leds.csv: "1e400" is too large'),
@@ -208,12 +208,14 @@ def test_a_flaw_of_a_table_is_named(
     assert sentence in refusal(tmp_path, table().replace(old, new, 1))
 
 
-def test_rows_out_of_order_are_refused(tmp_path: Path) -> None:
+def test_rows_out_of_order_are_put_in_order(tmp_path: Path) -> None:
     lines = table().splitlines()
-    lines[2:4] = lines[3], lines[2]
-    text = refusal(tmp_path, "\n".join(lines))
-    assert "Line 3 of leds.csv: LED 3 is listed at the position" in text
-    assert "in ascending order" in text
+    turned = "\n".join([lines[0], *reversed(lines[1:])])
+    (tmp_path / "turned").mkdir()
+    leds = read_pen(saved(tmp_path, table())).leds
+    np.testing.assert_array_equal(
+        read_pen(saved(tmp_path / "turned", turned)).leds, leds
+    )
 
 
 @pytest.mark.parametrize(

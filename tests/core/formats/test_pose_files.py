@@ -86,6 +86,20 @@ def test_poses_of_other_programs_are_read_in_their_conventions(
     assert found.n_lost == 0
 
 
+@pytest.mark.parametrize(
+    ("unit", "size"), [("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)]
+)
+def test_the_unit_of_translations_is_that_of_their_names(
+    tmp_path: Path, unit: str, size: float
+) -> None:
+    names = ["qx", "qy", "qz", "qw", *(f"t{axis} [{unit}]" for axis in "xyz")]
+    path = tmp_path / "poses.tsv"
+    lines = ["\t".join(names), *rows(QUATERNIONS, MOVED / size)]
+    path.write_text("\n".join(lines) + "\n")
+
+    np.testing.assert_allclose(read_poses(path).translations, MOVED, rtol=1e-9)
+
+
 def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> None:
     states = ["OK"] * N_POSES
     states[LOST] = "Missing"
@@ -114,6 +128,9 @@ def test_a_pose_that_a_flag_calls_invalid_is_left_out(tmp_path: Path) -> None:
         (b"[[ 1.  0.]\n [ 0.  1.]]\n", "numpy"),
         (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "numpy"),
         (b"0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "Open3D"),
+        (b"fr 21753\nts 39596.02\n6dcal 1\n6d 0\n", "DTrack"),
+        (b"#ROSBAG V2.0\n", "ROS bag"),
+        (b"\x02\x50" + bytes(500), "C3D"),
         (b"NO_OF_FRAMES\t80\nNO_OF_BODIES\t1\n", "Qualisys"),
         (b"header:\n  seq: 1\npose:\n  position:\n    x: 1\n", "ROS"),
         (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
@@ -129,12 +146,14 @@ def test_poses_in_a_form_that_is_not_read_are_named(
         read_poses(path)
 
 
-@pytest.mark.parametrize("angles", ["rx,ry,rz", "roll,pitch,yaw"])
+@pytest.mark.parametrize(
+    "angles", ["rx,ry,rz", "roll,pitch,yaw", "roll_deg,pitch_deg,yaw_deg", "a,b,c"]
+)
 def test_angles_are_refused_by_name(tmp_path: Path, angles: str) -> None:
     path = tmp_path / "poses.csv"
     path.write_text(f"{angles},tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n")
 
-    with pytest.raises(FileError, match=r"quaternions or matrices|columns of poses"):
+    with pytest.raises(FileError, match=r"quaternions or matrices; name .* rvec_x"):
         read_poses(path)
 
 
