@@ -23,7 +23,6 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.found import (
-    SECOND_PEN,
     Discovery,
     discovery_of,
     require_certain,
@@ -32,11 +31,7 @@ from lightpen_extensions.discover.found import (
     require_no_second_pen,
     require_one_camera,
 )
-from lightpen_extensions.discover.hypotheses import (
-    Hypothesis,
-    require_one_focal_length,
-    solve_seed,
-)
+from lightpen_extensions.discover.hypotheses import Hypothesis, solve_seed
 from lightpen_extensions.discover.labelling import Labelled, label, pixels_of
 from lightpen_extensions.discover.scale import Request, with_lengths_known
 from lightpen_extensions.discover.scaled_start import (
@@ -46,7 +41,6 @@ from lightpen_extensions.discover.scaled_start import (
 )
 from lightpen_extensions.discover.starts import any_covariance
 from lightpen_extensions.discover.tracks import (
-    Pieces,
     Report,
     Sightings,
     find_lamps,
@@ -71,7 +65,6 @@ class _Swing:
     sightings: Sightings
     centers: tuple[FloatArray, ...]  # spots that are no lamps, px
     kept: tuple[IntArray, ...]  # (S,) each, their numbers in the sightings
-    pieces: Pieces
     found: Labelled
     hypotheses: tuple[Hypothesis, ...]
     n_lamps: int
@@ -135,7 +128,6 @@ def _adjusted(
             raise
         if request.camera is not None:
             raise CalibrationError("discover.other-camera") from error
-        require_one_focal_length(swing.pieces, sightings.size, request.camera)
         raise CalibrationError("discover.not-settled") from error
     fits = calibration.used[swing.found.images]
     if not is_cleared and np.mean(~fits) > SLIPPED:
@@ -153,11 +145,7 @@ def _adjusted(
     discovery = discovery_of(
         *(calibration, choice, lengths), is_relative=request.is_relative
     )
-    try:
-        require_certain(discovery, sightings)
-    except CalibrationError:  # perhaps because the focal length changed
-        require_one_focal_length(swing.pieces, sightings.size, request.camera)
-        raise
+    require_certain(discovery, sightings)
     return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)
 
 
@@ -177,9 +165,7 @@ def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _
     report(0.4)
     found = label(seed, certain, centers, width)
     require_no_second_pen(found)
-    if np.median(found.unexplained.sum(axis=1)) >= SECOND_PEN:
-        require_one_focal_length(joined, sightings.size, request.camera)
-    return _Swing(sightings, centers, kept, joined, found, seed.hypotheses, len(lamps))
+    return _Swing(sightings, centers, kept, found, seed.hypotheses, len(lamps))
 
 
 def _of_images(found: Labelled, some: BoolArray) -> Labelled:

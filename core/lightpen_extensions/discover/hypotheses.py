@@ -27,9 +27,7 @@ from lightpen_extensions.discover.starts import (
     any_camera,
     factorise,
     farthest_apart,
-    filled_tracks,
     focal_length_of,
-    focal_sigma,
     free_focal_length,
     held_camera,
     ideal_camera,
@@ -49,7 +47,6 @@ ATTEMPTS = (
     (0.17, 0.83, 0.2),
     (0.25, 0.75, 1e-6),
 )
-N_CHECKING = 3  # of the attempts, where only the reason of a refusal is sought
 SHORTEST, LONGEST = 0.3, 12.0  # image widths, of a focal length that may be
 MIN_PIECES = 5  # of a part of the swing to begin with
 MIN_IMAGES = 25
@@ -63,8 +60,6 @@ ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
 FITTING = 0.7  # px: a start that fits
 WELL = 0.1  # px: a start good enough to end the search
 ALIKE = 0.02  # of the pen's size, within which two shapes are one
-END, ENDS_APART = 1 / 6, 4.0  # of the images, and standard deviations
-APART = 0.2  # of the misfit of all, allowed for a part of them alone
 DECIDED = 2.0  # times the misfit of the best that the mirrored one must have
 
 
@@ -103,9 +98,6 @@ def solve_seed(
     fits = seed.start.sigma <= FITTING
     if fits and seed.margin >= DECIDED:
         return seed
-    if not fits:
-        require_one_focal_length(pieces, size, known, APART * seed.start.sigma)
-        _require_one_pen(pieces, seed, size, known)
     if fits:
         raise CalibrationError("discover.mirror-undecided")
     raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
@@ -146,14 +138,13 @@ def _solved(
     chosen: IntArray,
     size: tuple[int, int],
     known: Camera | None,
-    n_attempts: int | None = None,
 ) -> Seed:
     """Return the best of all hypotheses for a part of a swing.
 
     Where none fits well, smaller parts and other depths of the shape are tried.
     """
     tried: list[Seed] = []
-    for first, last, least_metric in ATTEMPTS[:n_attempts]:
+    for first, last, least_metric in ATTEMPTS:
         n = len(images)
         part = images[int(first * n) : int(last * n)]
         shown = (pieces.spots[np.ix_(part, chosen)] >= 0).mean(axis=0)
@@ -221,76 +212,6 @@ def _are_alike(one: Start, other: Start) -> bool:
     leds, others = one.state.pen.leds, other.state.pen.leds
     R, t = fit_rigid(leds, others)
     return bool(np.abs(leds @ R.T + t - others).max() < ALIKE * UNIT)
-
-
-def _require_one_pen(
-    pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
-) -> None:
-    """Refuse tracks of two pens: a part of them fits much better alone.
-
-    The tracks of two bodies span subspaces of their own [1]_.
-
-    References
-    ----------
-    .. [1] J. P. Costeira, T. Kanade, "A multibody factorization method for
-       independently moving objects", Int. J. Computer Vision 29 (1998) 159-179.
-    """
-    if len(seed.pieces) < 2 * MIN_PIECES - 2:
-        return
-    images = np.arange(seed.images[0], seed.images[-1] + 1)
-    tracks = filled_tracks(pieces.pixels[np.ix_(images, seed.pieces)])
-    flat = np.concatenate([tracks[..., 0], tracks[..., 1]])
-    basis = np.linalg.svd(flat, full_matrices=False)[2][:8]
-    alike = np.abs(basis.T @ basis)
-    np.fill_diagonal(alike, 0.0)
-    root = 1 / np.sqrt(alike.sum(axis=1))
-    parting = np.linalg.eigh(alike * np.outer(root, root))[1][:, -2] * root
-    for side in (parting >= np.median(parting), parting > 0):
-        larger = seed.pieces[side if 2 * side.sum() >= len(side) else ~side]
-        if not MIN_PIECES <= len(larger) <= len(seed.pieces) - 2:
-            continue
-        part = _solved(pieces, images, larger, size, known, N_CHECKING)
-        if part.start.sigma < APART * seed.start.sigma:
-            n_others = len(seed.pieces) - len(larger)
-            raise CalibrationError("discover.two-pens", n_others=n_others)
-
-
-def require_one_focal_length(
-    pieces: Pieces,
-    size: tuple[int, int],
-    known: Camera | None,
-    most_misfit: float = FITTING,
-) -> None:
-    """Refuse a swing whose ends fit alone, with focal lengths of their own.
-
-    Ends fit that have ``most_misfit``, px, or less.
-    """
-    n = len(pieces.spots)
-    n_end = max(MIN_IMAGES, int(END * n))
-    focal_lengths, sigmas, misfits = [], [], []
-    for end in (slice(0, n_end), slice(n - n_end, n)):  # it changed in between
-        part = Pieces(pieces.pixels[end], pieces.spots[end])
-        try:
-            seed = _solved(part, *_best_part(part), size, known, N_CHECKING)
-        except CalibrationError:
-            return
-        if seed.start.sigma > most_misfit:
-            return
-        pixels = part.pixels[np.ix_(seed.images, seed.pieces)]
-        camera = seed.start.state.rig.cameras[0]
-        prior = camera_prior(camera, known)
-        length = KnownLength(*farthest_apart(seed.start.state.pen.leds), 1e-4 * UNIT)
-        misfits.append(seed.start.sigma)
-        focal_lengths.append(camera.fx)
-        sigmas.append(focal_sigma(seed.start, pixels, prior, (length,)))
-    if max(misfits) > DECIDED * min(misfits):
-        return  # the worse one is at another minimum
-    first_focal, last_focal = focal_lengths
-    by_chance = ENDS_APART * float(np.linalg.norm(sigmas))
-    if abs(last_focal - first_focal) > by_chance:
-        raise CalibrationError(
-            "discover.camera-changed", first=first_focal, second=last_focal
-        )
 
 
 @dataclass(frozen=True, eq=False)
