@@ -35,12 +35,7 @@ from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.change_point import ChangePoint, step_of_poses
 from lightpen.estimation.bundle.consistency_findings import Contradiction
 from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
-from lightpen.estimation.bundle.led_quality import (
-    LedQuality,
-    TipFrames,
-    measure_leds,
-    tip_frames,
-)
+from lightpen.estimation.bundle.led_quality import LedQuality, measure_leds
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of, read_diameter
 from lightpen.estimation.contact.joint import (
@@ -164,11 +159,6 @@ class Calibration:
             *(bundle.state, bundle.residuals, bundle.used, bundle.unknowns.noise),
             self.budget.correlation_factor,
         )
-
-    @cached_property
-    def tip_frames(self) -> TipFrames | None:
-        """The tip in the frame of the LED file and in the frame of the actual LEDs."""
-        return tip_frames(self.bundle, self.leds, self.joint.tip_pen)
 
     @property
     def led_sigma(self) -> float:

@@ -195,24 +195,6 @@ class AdjustmentRecord(Struct, frozen=True):
     image_fields: tuple[ImageFieldRecord, ...]
 
 
-class TipFramesRecord(Struct, frozen=True):
-    """The tip in both pen frames, if displaced LEDs make the pen frame ambiguous.
-
-    Attributes
-    ----------
-    of_file_mm
-        In the frame of the LED file, defined by the LEDs that are not displaced.
-    of_all_leds_mm
-        In the frame that fits all LEDs as measured.
-    result_is_of_file
-        Whether the result and its U refer to the former.
-    """
-
-    of_file_mm: Vector
-    of_all_leds_mm: Vector
-    result_is_of_file: bool
-
-
 class SelfCheckRecord(Struct, frozen=True):
     """Errors with which half of the LEDs predict the others.
 
@@ -438,8 +420,6 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
         Default values for what the files do not state.
     fixed_lamps
         One entry for each camera with fixed lamps in view.
-    tip_frames
-        Only if LEDs are displaced.
     self_check
         Comparison of one half of the LEDs with the other.
     instrument
@@ -477,7 +457,6 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     weakest_direction: DirectionRecord
     coverage: CoverageRecord
     leds: tuple[LedRecord, ...]
-    tip_frames: TipFramesRecord | None = None
     self_check: SelfCheckRecord | None = None
     rig: RigRecord | None = None
     inputs: InputsRecord

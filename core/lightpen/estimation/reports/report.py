@@ -34,7 +34,6 @@ from lightpen.estimation.reports.calibration_record import (
     RigRecord,
     SelfCheckRecord,
     SpotRecord,
-    TipFramesRecord,
     UncertaintyRecord,
     VerdictLimits,
     VerdictRecord,
@@ -64,7 +63,7 @@ def calibration_record(
     result = reported(calibration)
     tip, nominal = result.tip_pen, inputs.nominal_tip
     several = len(calibration.cameras) > 1
-    frames, check = calibration.tip_frames, calibration.self_check
+    check = calibration.self_check
     return CalibrationRecord(
         program=THIS_PROGRAM,
         created=local_now().replace(microsecond=0),
@@ -100,7 +99,6 @@ def calibration_record(
         ),
         coverage=_coverage(calibration),
         leds=_leds(calibration),
-        tip_frames=None if frames is None else TipFramesRecord(*plain(tuple(frames))),
         self_check=None if check is None else SelfCheckRecord(*check),
         rig=_rig(calibration) if several else None,
         inputs=_inputs(inputs, calibration.observations.interval_ms),

@@ -56,7 +56,6 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *([message("warning.own-images")] if calibration.shares_images else []),
         *_noise_warnings(calibration),
         *_self_check_warnings(calibration),
-        *_frame_warnings(calibration),
         *_small_led_warnings(calibration),
     ]
     warnings += [
@@ -106,23 +105,6 @@ def _self_check_warnings(calibration: Calibration) -> list[Message]:
     if check is None or check.is_passed:
         return []
     return [message("warning.self-check", value=check.value, limit=check.limit)]
-
-
-def _frame_warnings(calibration: Calibration) -> list[Message]:
-    """Return in which frame the tip is, where displaced LEDs leave it open."""
-    frames = calibration.tip_frames
-    if frames is None:
-        return []
-    leds = ", ".join(map(str, calibration.leds.displaced))
-    by_file, by_all = (
-        " ".join(f"{value:.4f}" for value in tip)
-        for tip in (frames.of_file, frames.of_all)
-    )
-    if frames.is_of_file:
-        return [
-            message("warning.frame-of-file", leds=leds, by_file=by_file, by_all=by_all)
-        ]
-    return [message("warning.frame-of-all", leds=leds, by_file=by_file, by_all=by_all)]
 
 
 def _small_led_warnings(calibration: Calibration) -> list[Message]:
