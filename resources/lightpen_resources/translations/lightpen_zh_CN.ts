@@ -7631,14 +7631,6 @@
         <translation>密码有 {length} 个字符。请至少输入 {needed} 个。</translation>
     </message>
     <message>
-        <source>The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the former. Measure with this result, which contains the LEDs as they are; to measure with the LED file, leave out LED {leds}.</source>
-        <translation>光笔坐标系取决于 LED {leds}：按不含该 LED 的 LED 文件，测头为 {by_file} mm；按全部 LED 的实际位置，为 {by_all} mm。结果和 U 以前者为准。测量时请使用本结果，它含有 LED 的实际位置；若用 LED 文件测量，请不使用 LED {leds}。</translation>
-    </message>
-    <message>
-        <source>The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the latter. Measure with this result, which contains the LEDs as they are; to measure with the LED file, use the former tip and leave out LED {leds}.</source>
-        <translation>光笔坐标系取决于 LED {leds}：按不含该 LED 的 LED 文件，测头为 {by_file} mm；按全部 LED 的实际位置，为 {by_all} mm。结果和 U 以后者为准。测量时请使用本结果，它含有 LED 的实际位置；若用 LED 文件测量，请使用前者并不使用 LED {leds}。</translation>
-    </message>
-    <message>
         <source>The pen hardly moved: its postures differ by {found:.1f}° (RMS); {needed:.0f}° are needed. Tilt the pen to all sides by 20° or more, and turn it about its own axis.</source>
         <translation>光笔几乎没有动：各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请把光笔向各个方向倾斜 20° 以上，并绕自身轴线转动。</translation>
     </message>
