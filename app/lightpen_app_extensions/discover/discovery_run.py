@@ -27,7 +27,7 @@ from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.live_view import Mailbox
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.found import Discovery, Guide, guide_of, with_frame
+from lightpen_extensions.discover.found import Discovery, Guide, guide_of
 from lightpen_extensions.discover.scale import Request
 from lightpen_extensions.discover.tracks import sightings_of_spots
 
@@ -139,12 +139,6 @@ class DiscoveryRun(QObject):
         """End the computation; what was found before stays."""
         self._job.cancel()
         self._become(progress=None)
-
-    def choose_frame(self, origin: int, along: int) -> None:
-        """Give the pen a frame by two LEDs: the origin, and one along y."""
-        if self._state.found is not None:
-            found = with_frame(self._state.found, origin - 1, along - 1)
-            self._become(found=found)
 
     def save(self) -> None:
         """Write both files beside the images, and use all of them."""

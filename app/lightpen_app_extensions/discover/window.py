@@ -122,7 +122,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._compute.clicked.connect(self._on_compute_clicked)
         self._progress.cancelled.connect(self._run.cancel)
         self._save.clicked.connect(self._run.save)
-        self._pen.led_chosen.connect(self._on_led_chosen)
         for edit in fields:
             edit.textEdited.connect(self._refresh)
             edit.value_changed.connect(self._refresh)
@@ -141,16 +140,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _on_image_shown(self, shown: DisplayedImage) -> None:
         if self.isVisible() and not self._run.state.is_final:
             self._image.set_half(shown.half, shown.size, live_markers(shown.seen))
-
-    def _on_led_chosen(self, led: int) -> None:
-        """Take the first LED as origin of the pen's frame, the second along y."""
-        state = self._run.state
-        if state.found is None or not (state.is_final and state.found.has_free_frame):
-            return
-        origin = self._pen.chosen()
-        self._pen.set_chosen(0 if origin else led)
-        if origin not in (0, led):
-            self._run.choose_frame(origin, led)
 
     def _on_compute_clicked(self) -> None:
         if is_refusing(self):
@@ -196,12 +185,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         pair = _longest_pair(found)
         if pair and not self._length.value():
             self._enter_simulated_length()
-        self._how.setText(self._how_to_measure(pair))
-        if is_final:
-            words = self.tr(
-                "Frame of the pen: click the LED at the origin, then one along y."
-            )
-            self._how.setText(words if found and found.has_free_frame else "")
+        self._how.setText("" if is_final else self._how_to_measure(pair))
         self._how.setVisible(bool(self._how.text()))
         self._facts.setText(self._found_text(found) if is_final else "")
         overlay = BoardOverlay()

@@ -18,7 +18,7 @@ from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mi
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR, N_DIRECTIONS, dial_counts, inverse
 from lightpen.model.limits import SwingLimits
-from lightpen.model.pen import Pen, moved, order_of_paper
+from lightpen.model.pen import Pen, moved
 from lightpen.model.rigid import Posture, tilts_of
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 from lightpen.swing.capture.guidance import (
@@ -28,7 +28,7 @@ from lightpen.swing.capture.guidance import (
     visible_fields,
 )
 from lightpen_extensions.boards.distortion import Choice
-from lightpen_extensions.discover.hypotheses import Hypothesis, frame_by, framed
+from lightpen_extensions.discover.hypotheses import Hypothesis, framed
 from lightpen_extensions.discover.labelling import Labelled
 from lightpen_extensions.discover.scale import (
     Request,
@@ -62,12 +62,6 @@ class Discovery:
     def parameters(self) -> Parameters:
         """Indices of each kind of parameter in the covariance."""
         return self.calibration.instrument.parameters
-
-    @property
-    def has_free_frame(self) -> bool:
-        """Whether the frame can be chosen: the LEDs lack the layout of the paper."""
-        up = self.pen.leds.mean(axis=0) - self.tip_pen
-        return order_of_paper(self.pen.leds, up) is None
 
     @property
     def expanded_uncertainty(self) -> FloatArray:
@@ -150,11 +144,6 @@ def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
     if earlier is not None:
         return replace(earlier, marks=np.concatenate([earlier.marks, marks]))
     return FoundCamera(marks, start.intrinsics, start.covariance)
-
-
-def with_frame(found: Discovery, origin: int, along: int) -> Discovery:
-    """Return what was found with one LED as origin and y to another, by indices."""
-    return _in_frame(found, *frame_by(found.pen, origin, along))
 
 
 def _in_frame(found: Discovery, R: FloatArray, t: FloatArray) -> Discovery:

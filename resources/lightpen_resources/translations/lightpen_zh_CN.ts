@@ -746,10 +746,6 @@
         <translation>正在计算</translation>
     </message>
     <message>
-        <source>Frame of the pen: click the LED at the origin, then one along y.</source>
-        <translation>光笔坐标系：先点击原点处的 LED，再点击 y 方向上的一个 LED。</translation>
-    </message>
-    <message>
         <source>U of the tip is {0:.3f} mm; the limit is {1:g} mm. Swing again with more images and tilt, or measure the length better.</source>
         <translation>测头的 U 为 {0:.3f} mm，限值为 {1:g} mm。请以更多图像和更大倾斜重新摆动，或更准确地测量该长度。</translation>
     </message>
