@@ -310,6 +310,15 @@ def grade_text(grade: Grade) -> str:
     return _translated(_GRADES[grade])
 
 
+def age_text(days: int) -> str:
+    """Return an age in days, such as "Yesterday"."""
+    if days == 0:
+        return _translated(QT_TRANSLATE_NOOP("phrases", "Today"))
+    if days == 1:
+        return _translated(QT_TRANSLATE_NOOP("phrases", "Yesterday"))
+    return _translated(QT_TRANSLATE_NOOP("phrases", "{0} days ago")).format(days)
+
+
 def origin_text(origin: Origin | None) -> str:
     """Return the name of an origin; None if unknown."""
     return _translated(_ORIGINS[origin])

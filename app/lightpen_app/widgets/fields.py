@@ -84,6 +84,8 @@ class EnterEdit(QLineEdit):
     Where nothing was edited, Enter is left to the window.
     """
 
+    entered = Signal()  # Enter was pressed after an edit
+
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         was_edited = self.isModified()
@@ -91,6 +93,8 @@ class EnterEdit(QLineEdit):
         if event.key() in ENTER_KEYS:
             event.setAccepted(was_edited)
             self.setModified(False)
+            if was_edited:
+                self.entered.emit()
 
 
 class PathField(QWidget):

@@ -210,11 +210,10 @@ class FittedWindow(WidgetMixin):
 
 @dataclass(frozen=True)
 class SizeClass:
-    """Whether a widget is short of room, in width and in height, or has plenty."""
+    """Whether a widget is short of room, in width and in height."""
 
     is_narrow: bool = False
     is_low: bool = False
-    is_large: bool = False
 
     @property
     def margin(self) -> int:
@@ -234,7 +233,6 @@ class ResponsiveLayout(WidgetMixin):
     # px; with less width or height it is short of room.
     narrow_below = 0
     low_below = 0
-    large_from: QSize | None = None  # None: never large
     _room = SizeClass()
 
     def _use_room(self) -> None:
@@ -248,16 +246,10 @@ class ResponsiveLayout(WidgetMixin):
         room = SizeClass(
             is_narrow=size.width() < self.narrow_below,
             is_low=size.height() < self.low_below,
-            is_large=_holds(size, self.large_from),
         )
         if room != self._room:
             self._room = room
             self._use_room()
-
-
-def _holds(size: QSize, other: QSize | None) -> bool:
-    """Return whether another size fits into a size, if there is one."""
-    return other is not None and other.boundedTo(size) == other
 
 
 class PageScroll(QScrollArea):

@@ -27,13 +27,14 @@ def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
     spots = seen.spots
     numbers = led_numbers(seen)
     radii = RING * np.sqrt(spots.areas / np.pi) + CLEARANCE
+    angles = _free_angles(spots.centers)
     other = Tone.ACTIVE if seen.detection is None else Tone.WARN
     return tuple(
         Marker(
             x, y, radius, numbers.get(i, ""), tone=Tone.GOOD if i in numbers else other
         )
-        for i, ((x, y), radius) in enumerate(
-            zip(spots.centers.tolist(), radii.tolist(), strict=True)
+        for i, ((x, y), radius, angle) in enumerate(
+            zip(spots.centers.tolist(), radii.tolist(), angles.tolist(), strict=True)
         )
     )
 
@@ -48,6 +49,16 @@ def stray_markers(circles: FloatArray, label: str) -> Iterator[Marker]:
     """Yield a ring for each row x, y, radius of (M, 3) stray lights, px."""
     for x, y, radius in circles.tolist():
         yield Marker(x, y, RING * radius, label, Tone.BAD, label_angle=0.0)
+
+
+def _free_angles(places: FloatArray) -> FloatArray:
+    """Return the direction with most room at each of (N, 2) places, rad."""
+    offsets = places[:, None] - places[None]
+    distances = np.linalg.norm(offsets, axis=-1)
+    np.fill_diagonal(distances, np.inf)
+    push = (offsets / np.maximum(distances, 1.0)[..., None] ** 3).sum(axis=1)
+    angles: FloatArray = np.arctan2(push[:, 1], push[:, 0])
+    return angles
 
 
 def led_numbers(seen: LiveImage) -> dict[int, str]:

@@ -98,7 +98,7 @@ class RowTable(QTableView):
         self.viewport().update()
 
 
-NUMBER_ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
+NUMBER_ROW_HEIGHT = 3 * GRID  # px; also of the header
 WIDEST_NAME = 28 * GRID  # px, of a row; a longer one loses its end
 
 
@@ -140,14 +140,12 @@ class NumberTable(QTableWidget):
         self.set_letters(TextSize.BODY)
 
     def set_letters(self, size: TextSize) -> None:
-        """Show the figures larger, for a large window, smaller or as usual."""
+        """Show the figures smaller or as usual."""
         # Before the heights: none is less than the letters are high.
         for each in (self, self.horizontalHeader(), self.verticalHeader()):
             set_size(each, size)
-        is_large = size > TextSize.BODY
-        self._row_height = LARGE_ROW_HEIGHT if is_large else NUMBER_ROW_HEIGHT
-        self.horizontalHeader().setFixedHeight(self._row_height)
-        self.verticalHeader().setDefaultSectionSize(self._row_height)
+        self.horizontalHeader().setFixedHeight(NUMBER_ROW_HEIGHT)
+        self.verticalHeader().setDefaultSectionSize(NUMBER_ROW_HEIGHT)
         self.updateGeometry()
 
     def value(self) -> Figures:
@@ -175,7 +173,7 @@ class NumberTable(QTableWidget):
 
     @override
     def sizeHint(self) -> QSize:
-        height = self._row_height * (1 + self.rowCount()) + 2
+        height = NUMBER_ROW_HEIGHT * (1 + self.rowCount()) + 2
         return QSize(super().sizeHint().width(), height)
 
     @override

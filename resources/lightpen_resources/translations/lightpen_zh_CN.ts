@@ -493,18 +493,6 @@
         <translation>{0} 天后到期</translation>
     </message>
     <message>
-        <source>today</source>
-        <translation>今天</translation>
-    </message>
-    <message>
-        <source>yesterday</source>
-        <translation>昨天</translation>
-    </message>
-    <message>
-        <source>{0} days ago</source>
-        <translation>{0} 天前</translation>
-    </message>
-    <message>
         <source>The camera sends no images.</source>
         <translation>相机没有发送图像。</translation>
     </message>
@@ -1781,26 +1769,6 @@
         <source>In the future</source>
         <translation>日期在将来</translation>
     </message>
-    <message>
-        <source>Today</source>
-        <translation>今天</translation>
-    </message>
-    <message>
-        <source>Yesterday</source>
-        <translation>昨天</translation>
-    </message>
-    <message>
-        <source>{0} days ago</source>
-        <translation>{0} 天前</translation>
-    </message>
-    <message>
-        <source>{0} months ago</source>
-        <translation>{0} 个月前</translation>
-    </message>
-    <message>
-        <source>{0} years ago</source>
-        <translation>{0} 年前</translation>
-    </message>
 </context>
 <context>
     <name>LastResultPresenter</name>
@@ -2807,17 +2775,6 @@
     <message>
         <source>{0} was changed since it was stored with pen {1}. Open the LED file of this pen.</source>
         <translation>{0} 在与光笔 {1} 一起保存后被更改。请打开此光笔的 LED 文件。</translation>
-    </message>
-</context>
-<context>
-    <name>PenInSpace</name>
-    <message>
-        <source>The pen in space</source>
-        <translation>光笔的空间姿态</translation>
-    </message>
-    <message>
-        <source>Current tilt of the pen and outline of the target posture</source>
-        <translation>光笔当前的倾斜和目标姿态的轮廓</translation>
     </message>
 </context>
 <context>
@@ -9392,6 +9349,18 @@
     <message>
         <source>Lens and LED centres</source>
         <translation>镜头与 LED 中心</translation>
+    </message>
+    <message>
+        <source>Today</source>
+        <translation>今天</translation>
+    </message>
+    <message>
+        <source>Yesterday</source>
+        <translation>昨天</translation>
+    </message>
+    <message>
+        <source>{0} days ago</source>
+        <translation>{0} 天前</translation>
     </message>
     <message>
         <source>ACCEPTED</source>

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QFontMetricsF, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -191,11 +191,15 @@ def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> Non
 
 
 def test_a_click_on_a_dot_chooses_its_image(misfits: MisfitPlot, qtbot: QtBot) -> None:
-    place = misfits.pixel_of(2)
+    (canvas,) = misfits.findChildren(Canvas)
+    canvas.fit()
+    view = canvas.getPlotItem().vb
+    scene = view.mapViewToScene(QPointF(*misfits.place_of(2)))
+    place = canvas.mapFromScene(scene)
 
     with qtbot.waitSignal(misfits.number_chosen) as chosen:
         QTest.mouseClick(
-            misfits.canvas(),
+            canvas.viewport(),
             Qt.MouseButton.LeftButton,
             Qt.KeyboardModifier.NoModifier,
             place,

@@ -1,6 +1,5 @@
 """Tests of widgets that are arranged otherwise where they have little room."""
 
-from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
@@ -10,7 +9,6 @@ from lightpen_app.widgets.fitting import ResponsiveLayout, SizeClass
 
 class Arranged(ResponsiveLayout, QWidget):
     narrow_below, low_below = 300, 200
-    large_from = QSize(600, 500)
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,16 +32,3 @@ def test_a_widget_is_arranged_anew_only_when_its_room_changes(qtbot: QtBot) -> N
         SizeClass(is_narrow=True, is_low=True),
         SizeClass(),
     ]
-
-
-def test_plenty_of_room_is_reported_where_there_is_plenty_both_ways(
-    qtbot: QtBot,
-) -> None:
-    widget = Arranged()
-    qtbot.addWidget(widget)
-    widget.resize(300, 200)
-    widget.show()
-    for size in ((900, 499), (600, 500), (1200, 900), (599, 900)):
-        widget.resize(*size)
-
-    assert widget.arranged_for == [SizeClass(is_large=True), SizeClass()]

@@ -1,12 +1,11 @@
 """The entries of the archive as a table, the newest first, read on demand."""
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
 from itertools import chain, islice
 from typing import Any
 
-from PySide6.QtCore import QItemSelectionModel, Qt, Signal
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QWidget
 from typing_extensions import override
@@ -24,7 +23,6 @@ from lightpen_app.steps.history.entry_panel import (
     type_and_state_text,
     verdict_text,
 )
-from lightpen_app.steps.history.reader import BLOCK
 from lightpen_app.widgets.fields import ChoiceField, DateField, Translated
 from lightpen_app.widgets.tables import RIGHT, ROW_HEIGHT, Index, RowTable, TitledModel
 
@@ -34,65 +32,49 @@ NAMES = (STATION, PEN, TIP, BY)
 LONGEST_NAME = 16  # letters of a name that are shown
 WIDEST = 26 * GRID  # px, of a column
 LEAST_ROWS = 3
-MOST_BLOCKS = 40  # that are kept
 MOST_SELECTED = 1000  # lines that are compared
-UNREAD = "\u2026"
 
 
 class HistoryModel(TitledModel):
-    """One row for each entry; visible rows are read."""
+    """One row for each entry; more are read when the last is seen."""
 
     n_columns = WORDS + 1
-    block_wanted = Signal(int)  # number of the first line of a block to read
+    more_wanted = Signal(int)  # how many lines there are already
 
     def __init__(self, kind_of: EventText) -> None:
         super().__init__()
         self._kind_of = kind_of
         self._n_lines = 0
-        self._blocks: OrderedDict[int, tuple[Line, ...]] = OrderedDict()
-        self._asked: set[int] = set()
+        self._lines: list[Line] = []
 
     def set_lines(self, n_lines: int, first: Sequence[Line]) -> None:
         """Show other entries; the newest are read already."""
         self.beginResetModel()
-        self._n_lines = n_lines
-        self._blocks.clear()
-        self._asked.clear()
-        self._blocks[0] = tuple(first)
+        self._n_lines, self._lines = n_lines, list(first)
         self.endResetModel()
 
-    def put_block(self, first: int, found: Sequence[Line]) -> None:
-        """Show the lines of a requested block."""
-        self._asked.discard(first)
-        self._blocks[first] = tuple(found)
-        while len(self._blocks) > MOST_BLOCKS:
-            self._blocks.popitem(last=False)
-        last = min(first + BLOCK, self._n_lines) - 1
-        self.dataChanged.emit(self.index(first, 0), self.index(last, WORDS))
+    def add_lines(self, first: int, found: Sequence[Line]) -> None:
+        """Add the lines after as many others; such as were added are passed over."""
+        if first == len(self._lines) and found:
+            self.beginInsertRows(QModelIndex(), first, first + len(found) - 1)
+            self._lines += found
+            self.endInsertRows()
 
-    def forget_block(self, first: int) -> None:
-        """Request a block again when it is next shown."""
-        self._asked.discard(first)
-
-    def line(self, row: int) -> Line | None:
-        """Return a line; None until it is read."""
-        first = row - row % BLOCK
-        if first in self._blocks:
-            self._blocks.move_to_end(first)
-        elif first not in self._asked:
-            self._asked.add(first)
-            self.block_wanted.emit(first)
-        return self.known_line(row)
-
-    def known_line(self, row: int) -> Line | None:
-        """Return a line if it is read."""
-        first = row - row % BLOCK
-        block = self._blocks.get(first, ())
-        return block[row - first] if row - first < len(block) else None
+    def line(self, row: int) -> Line:
+        """Return a line."""
+        return self._lines[row]
 
     @override
     def rowCount(self, parent: Index | None = None) -> int:
-        return 0 if parent is not None and parent.isValid() else self._n_lines
+        return 0 if parent is not None and parent.isValid() else len(self._lines)
+
+    @override
+    def canFetchMore(self, parent: Index) -> bool:
+        return len(self._lines) < self._n_lines
+
+    @override
+    def fetchMore(self, parent: Index) -> None:
+        self.more_wanted.emit(len(self._lines))
 
     @override
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
@@ -100,14 +82,12 @@ class HistoryModel(TitledModel):
         if role == Qt.ItemDataRole.TextAlignmentRole and column in NUMBERS:
             return RIGHT
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
-            line = self.line(index.row())
-            text = UNREAD if line is None else _text(line, column, self._kind_of)
+            text = _text(self.line(index.row()), column, self._kind_of)
             if role == Qt.ItemDataRole.ToolTipRole:
                 return plain_tooltip(text)
             return shortened(text, LONGEST_NAME) if column in NAMES else text
         if role == Qt.ItemDataRole.ForegroundRole and column in (WHAT, VERDICT):
-            line = self.line(index.row())
-            tone = Tone.PLAIN if line is None else line_tone(line, column == VERDICT)
+            tone = line_tone(self.line(index.row()), column == VERDICT)
             widget = self.parent()
             assert isinstance(widget, QWidget)
             return (
@@ -139,12 +119,10 @@ class HistoryModel(TitledModel):
 
 
 class HistoryTable(Translated, RowTable):
-    """Shows the entries; the current one is reported once read."""
+    """Shows the entries, of which several can be selected."""
 
-    # Number of the first line of a block to show.
-    block_wanted = Signal(int)
-    # Other lines are current or selected, or were read by now.
-    selection_changed = Signal()
+    more_wanted = Signal(int)  # lines after as many others
+    selection_changed = Signal()  # other lines are current or selected
     columns_changed = Signal()  # the user chose other columns
 
     def __init__(self, kind_of: EventText) -> None:
@@ -172,9 +150,7 @@ class HistoryTable(Translated, RowTable):
             action.setChecked(True)
             action.toggled.connect(self._show_columns)
             action.triggered.connect(self.columns_changed)
-        self._model.block_wanted.connect(
-            self.block_wanted, Qt.ConnectionType.QueuedConnection
-        )
+        self._model.more_wanted.connect(self.more_wanted)
         chosen = self.selectionModel()
         chosen.currentRowChanged.connect(self.selection_changed)
         chosen.selectionChanged.connect(self.selection_changed)
@@ -193,15 +169,9 @@ class HistoryTable(Translated, RowTable):
         else:
             self.selection_changed.emit()
 
-    def put_block(self, first: int, found: Sequence[Line]) -> None:
-        """Show the lines of a requested block."""
-        self._model.put_block(first, found)
-        if self._is_chosen(first, first + BLOCK - 1):
-            self.selection_changed.emit()
-
-    def forget_block(self, first: int) -> None:
-        """Request a block again when it is next shown."""
-        self._model.forget_block(first)
+    def add_lines(self, first: int, found: Sequence[Line]) -> None:
+        """Show more lines, after as many others."""
+        self._model.add_lines(first, found)
 
     def set_stations(self, stations: Sequence[str]) -> None:
         """Take over which stations the entries are of."""
@@ -217,31 +187,17 @@ class HistoryTable(Translated, RowTable):
         for i, action in enumerate(self._shown):
             action.setChecked(i not in hidden)
 
-    def n_lines(self) -> int:
-        """Return the number of entries."""
-        return self._model.rowCount()
-
     def current(self) -> Line | None:
         """Return the current line."""
         at = self.currentIndex()
         return self._model.line(at.row()) if at.isValid() else None
 
     def selected(self) -> tuple[Line, ...]:
-        """Return the selected lines that are loaded, unless they are many."""
+        """Return the selected lines, unless they are many."""
         ranges = self.selectionModel().selection()
         parts = map(ranges.at, range(ranges.count()))
         rows = chain.from_iterable(range(r.top(), r.bottom() + 1) for r in parts)
-        found = map(self._model.known_line, islice(sorted(rows), MOST_SELECTED))
-        return tuple(line for line in found if line is not None)
-
-    def _is_chosen(self, first: int, last: int) -> bool:
-        """Return whether one of these rows is current or selected."""
-        chosen = self.selectionModel().selection()
-        ranges = map(chosen.at, range(chosen.count()))
-        is_current = first <= self.currentIndex().row() <= last
-        return is_current or any(
-            r.top() <= last and first <= r.bottom() for r in ranges
-        )
+        return tuple(map(self._model.line, islice(sorted(rows), MOST_SELECTED)))
 
     def _show_columns(self) -> None:
         """Hide what the user does not want, and the station where there is only one."""

@@ -27,8 +27,7 @@ from lightpen.record.library.tip_library import Library
 from lightpen_app.work.job import Job, Report
 
 T = TypeVar("T")
-BLOCK = 100  # lines that are read at one time
-MOST_WAITING = 3  # blocks; of those that were scrolled past, none is read
+BLOCK = 200  # lines that are read at one time
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,7 @@ class HistoryReader(QObject):
     """Reads entries by filter; results for an earlier filter are discarded."""
 
     opened = Signal(object)  # Opening
-    block_read = Signal(int, object)  # number of the first line, and the lines
-    block_passed = Signal(int)  # number of a block that is no longer needed
+    more_read = Signal(int, object)  # number of the lines before, and the lines
     trend_read = Signal(object)  # Trend
     messages_read = Signal(object)  # entries that concern the one asked about
     due_read = Signal(object)  # the current tips, each a `DueTip`
@@ -59,13 +57,11 @@ class HistoryReader(QObject):
         self._logbook = logbook
         self._wanted = EntryFilter()
         self._jobs: dict[str, Job] = {}
-        self._waiting: list[int] = []
 
     def open(self, wanted: EntryFilter) -> None:
         """Read the number of entries and the newest ones."""
         self._wanted = wanted
-        self._waiting.clear()
-        for what in ("block", "trend", "remarks"):
+        for what in ("more", "trend", "remarks"):
             self._drop(what)
         logbook = self._logbook
 
@@ -82,15 +78,14 @@ class HistoryReader(QObject):
 
         self._start("open", read, self.opened.emit)
 
-    def read_block(self, first: int) -> None:
-        """Read the lines of a block, before earlier requests."""
-        if first in self._waiting:
-            return
-        self._waiting.append(first)
-        while len(self._waiting) > MOST_WAITING:
-            self.block_passed.emit(self._waiting.pop(0))
-        if "block" not in self._jobs:
-            self._read_next_block()
+    def read_more(self, first: int) -> None:
+        """Read the lines after as many others."""
+        logbook, wanted = self._logbook, self._wanted
+        self._start(
+            "more",
+            lambda _: lines(logbook.opened().database, wanted, first, BLOCK),
+            partial(self.more_read.emit, first),
+        )
 
     def read_trend(self, wanted: EntryFilter) -> None:
         """Read the calibrations of a pen and tip."""
@@ -124,22 +119,6 @@ class HistoryReader(QObject):
         """Cancel running jobs."""
         for what in tuple(self._jobs):
             self._drop(what)
-
-    def _read_next_block(self) -> None:
-        if not self._waiting:
-            return
-        first = self._waiting.pop()
-        logbook, wanted = self._logbook, self._wanted
-        self._start(
-            "block",
-            lambda _: lines(logbook.opened().database, wanted, first, BLOCK),
-            partial(self._on_block_read, first),
-        )
-
-    def _on_block_read(self, first: int, found: tuple[Line, ...]) -> None:
-        self._jobs.pop("block", None)
-        self.block_read.emit(first, found)
-        self._read_next_block()
 
     def _start(
         self,

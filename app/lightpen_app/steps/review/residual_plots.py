@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QLineF, QPoint, QPointF, QRectF, Signal
+from PySide6.QtCore import QLineF, QPointF, QRectF, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
@@ -81,15 +80,6 @@ class MisfitPlot(Plot):
         """Return x and y at which an image is drawn."""
         return self._places[number]
 
-    def pixel_of(self, number: int) -> QPoint:
-        """Return the position of an image, in px of `canvas`."""
-        return self._pixel(*self._places[number])
-
-    def canvas(self) -> QWidget:
-        """Return the widget on which dots are clicked."""
-        canvas: QWidget = self._graphics.viewport()
-        return canvas
-
     @override
     def _restyle(self) -> None:
         super()._restyle()
@@ -102,11 +92,6 @@ class MisfitPlot(Plot):
         self._out.setBrush(pg.mkBrush(None))
         self._chosen.setPen(pg.mkPen(colors.text, width=2))
         self._chosen.setBrush(pg.mkBrush(None))
-
-    def _pixel(self, x: float, y: float) -> QPoint:
-        self._graphics.fit()
-        scene = self._item.vb.mapViewToScene(QPointF(x, y))
-        return QPoint(self._graphics.mapFromScene(scene))
 
     def _on_clicked(
         self, _plot: object, points: "list[pg.SpotItem]", _event: object

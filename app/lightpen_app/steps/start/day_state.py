@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from datetime import date, datetime, timedelta
+from datetime import date, timedelta
 
 from PySide6.QtCore import QCoreApplication
 
@@ -14,7 +14,7 @@ from lightpen.model.names import Origin
 from lightpen.record.library.tip_library import ItemKind, StationStatus, TipStatus
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.face import ReadinessItem
-from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
+from lightpen_app.look.phrases import GRADE_MARKS, age_text, first_missing, grade_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import (
@@ -169,7 +169,7 @@ def _row(pen: str, tip: str, statuses: StationStatus, *, is_simulated: bool) -> 
         if u is None
         else translate("DayPage", "{0} \u00b5m").format(number_text(1000 * u, 1))
     )
-    age = _age_text(found.calibrated, today)
+    age = age_text((today - local_time(found.calibrated).date()).days)
     return TipRow(pen, tip, due, um, age, _grade_message(found.grade), is_due)
 
 
@@ -186,15 +186,6 @@ def _due_text(last: date | None, today: date) -> str:
     if days == 0:
         return translate("DayPage", "due today")
     return translate("DayPage", "due in {0} days").format(days)
-
-
-def _age_text(calibrated: datetime, today: date) -> str:
-    days = (today - local_time(calibrated).date()).days
-    if days == 0:
-        return translate("DayPage", "today")
-    if days == 1:
-        return translate("DayPage", "yesterday")
-    return translate("DayPage", "{0} days ago").format(days)
 
 
 def _amber(*sentences: str) -> StatusMessage:

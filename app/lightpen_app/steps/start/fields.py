@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QMenu, QWidget
+from PySide6.QtWidgets import QCheckBox, QLabel, QMenu, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -14,8 +14,8 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import sign_icon
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
-from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
-from lightpen_app.widgets.fields import ChoiceField, Translated
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import ChoiceField, EnterEdit, Translated
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.state_banner import StatusMessage
 
@@ -93,7 +93,7 @@ class StationField(ChoiceField):
     def __init__(self) -> None:
         super().__init__()
         self._value = ""
-        self._edit = _NameEdit()
+        self._edit = EnterEdit()
         self._edit.setMaxLength(LONGEST_NAME)
         self.setLineEdit(self._edit)
         self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
@@ -143,20 +143,6 @@ class StationField(ChoiceField):
         self.set_value(name)
         if name != before:
             self.value_changed.emit(name)
-
-
-class _NameEdit(QLineEdit):
-    """A line edit whose Enter key only applies the text."""
-
-    entered = Signal()
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        is_typed = self.isModified()
-        super().keyPressEvent(event)
-        if is_typed and event.key() in ENTER_KEYS:
-            event.accept()  # the window would press its main button, too soon
-            self.entered.emit()
 
 
 REACH = 1000.0  # mm from the origin of the pen; no pen is longer

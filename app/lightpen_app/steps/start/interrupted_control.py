@@ -113,46 +113,33 @@ class InterruptedControl(QObject):
         self._panel.set_entries(entries)
 
     def _work_entry(self, work: InterruptedWork) -> InterruptedEntry:
-        def close() -> None:
-            self._on_close_requested(work)
-
-        def resume() -> None:
-            self._on_continue_requested(work)
-
-        if work.names is None:
-            return InterruptedEntry(work.words, None, close, is_damaged=True)
-        return InterruptedEntry(work.words, resume, close)
+        close = partial(self._on_close_requested, work)
+        resume = partial(self._on_continue_requested, work)
+        is_damaged = work.names is None
+        return InterruptedEntry(
+            work.words(), None if is_damaged else resume, close, is_damaged=is_damaged
+        )
 
     def _swing_entry(self, record: Record) -> InterruptedEntry:
         names, folder = record.header.names, record.folder
-
-        def words() -> RowWords:
-            called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-            parts = (*called, n_images_text(len(record.images)))
-            text = PARTED.join(filter(None, parts))
-            return self._row_words(moment_text(record.header.created), text)
-
+        called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
+        parts = (*called, n_images_text(len(record.images)))
+        text = PARTED.join(filter(None, parts))
         return InterruptedEntry(
-            words,
+            self._row_words(moment_text(record.header.created), text),
             lambda: self._on_resume_requested(folder),
             lambda: self._on_discard_requested(folder, discard_swing),
         )
 
     def _other_entry(self, record: Record) -> InterruptedEntry:
-        def words() -> RowWords:
-            heading = moment_text(record.header.created)
-            return self._row_words(heading, self.tr("In use by another program"))
-
+        heading = moment_text(record.header.created)
+        words = self._row_words(heading, self.tr("In use by another program"))
         return InterruptedEntry(words, None, None)
 
     def _damaged_entry(self, swing: DamagedSwing) -> InterruptedEntry:
-        def words() -> RowWords:
-            heading = self.tr("Damaged: {0}").format(shortened(swing.folder.name))
-            return self._row_words(heading, breakable(worded(swing.message)))
-
-        def discard() -> None:
-            self._on_discard_requested(swing.folder, discard_damaged)
-
+        heading = self.tr("Damaged: {0}").format(shortened(swing.folder.name))
+        words = self._row_words(heading, breakable(worded(swing.message)))
+        discard = partial(self._on_discard_requested, swing.folder, discard_damaged)
         return InterruptedEntry(words, None, discard, is_damaged=True)
 
     def _row_words(self, heading: str, description: str) -> RowWords:

@@ -6,7 +6,7 @@ One that another program captures, or that is damaged, is reported and not offer
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGroupBox, QWidget
 from typing_extensions import override
@@ -27,7 +27,7 @@ NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 class InterruptedEntry:
     """Interrupted work, and what can be done with it; None where it cannot."""
 
-    words: Callable[[], RowWords]
+    words: RowWords
     resume: Callable[[], object] | None
     discard: Callable[[], object] | None
     is_damaged: bool = False
@@ -40,13 +40,17 @@ class InterruptedRow(Translated, QFrame):
 
     def __init__(self, entry: InterruptedEntry) -> None:
         super().__init__()
-        self._entry = entry
+        words = entry.words
 
         # Widgets
         self._when = text_label(TextSize.BODY)
+        self._when.setText(words.heading)
         self._what = text_label(TextSize.SMALL, Tone.QUIET)
-        self._resume = self.make_button("", entry.resume or bool)
-        self._discard = self.make_button("", self.discard_requested)
+        self._what.setText(words.description)
+        self._resume = self.make_button(words.resume[0], entry.resume or bool)
+        self._discard = self.make_button(words.discard[0], self.discard_requested)
+        self.say(self._resume, name=words.resume[1].format(words.heading))
+        self.say(self._discard, name=words.discard[1].format(words.heading))
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
@@ -57,7 +61,6 @@ class InterruptedRow(Translated, QFrame):
         self._discard.setVisible(entry.discard is not None)
         if entry.is_damaged:
             set_tone(self._when, Tone.BAD)
-        self._retranslate()
 
     def words(self) -> tuple[str, str]:
         """Return the texts of the row."""
@@ -73,17 +76,6 @@ class InterruptedRow(Translated, QFrame):
         """Disable the buttons for a reason, or enable them for none."""
         self._resume.set_why_not(why)
         self._discard.set_why_not(why)
-
-    def _retranslate(self) -> None:
-        words = self._entry.words()
-        self._when.setText(words.heading)
-        self._what.setText(words.description)
-        for button, (text, name) in (
-            (self._resume, words.resume),
-            (self._discard, words.discard),
-        ):
-            button.setText(text)
-            button.setAccessibleName(name.format(words.heading))
 
 
 class InterruptedPanel(Translated, QGroupBox):
@@ -113,7 +105,6 @@ class InterruptedPanel(Translated, QGroupBox):
         )
 
         self.hide()
-        self._retranslate()
 
     def set_entries(self, entries: Sequence[InterruptedEntry]) -> None:
         """List interrupted work."""
@@ -125,7 +116,7 @@ class InterruptedPanel(Translated, QGroupBox):
         self._hint.setVisible(any(each.resume for each in entries))
         self._again.setVisible(not all(each.resume for each in entries))
         self.set_waiting(self._why_waiting)
-        self._retranslate()
+        self.setTitle(self.tr("Interrupted: {0}").format(len(entries)))
         self.setVisible(bool(entries))
         self._hold_rows()
 
@@ -157,13 +148,13 @@ class InterruptedPanel(Translated, QGroupBox):
 
     def _ask(self, entry: InterruptedEntry) -> None:
         """Ask below the rows, so that a double click discards nothing."""
+        words = entry.words
+        asked = f"{words.heading}: {words.question}"
+        question = Question(asked, words.discard[0], self.tr("Keep"))
+        self._question.ask_about(lambda: question, entry.discard or bool)
 
-        def question() -> Question:
-            words = entry.words()
-            asked = f"{words.heading}: {words.question}"
-            return Question(asked, words.discard[0], self.tr("Keep"))
-
-        self._question.ask_about(question, entry.discard or bool)
-
-    def _retranslate(self) -> None:
-        self.setTitle(self.tr("Interrupted: {0}").format(len(self._rows)))
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange and self._rows:
+            self.search_requested.emit()  # what is found is worded anew

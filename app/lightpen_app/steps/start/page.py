@@ -1,6 +1,5 @@
 """The step Start: day page and set-up of the station."""
 
-from PySide6.QtCore import QSize
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
@@ -31,7 +30,6 @@ class StartPage(ResponsiveLayout, Page):
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
-    large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
 
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
@@ -203,7 +201,6 @@ class StartPage(ResponsiveLayout, Page):
         self._day.set_narrow(is_narrow)
         self._setup.set_narrow(is_narrow)
         self._welcome.set_narrow(is_narrow)
-        self._result.set_room(self._room)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

@@ -15,12 +15,11 @@ from lightpen.record.library.tip_library import TipStatus
 from lightpen.record.results.results import Result
 from lightpen.swing.preparation import Preparation
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
-from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
+from lightpen_app.look.phrases import GRADE_MARKS, age_text, first_missing, grade_text
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, moment_text, shortened
 from lightpen_app.widgets.bars import WithdrawalBar
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.fitting import SizeClass
 from lightpen_app.widgets.state_banner import (
     SignLabel,
     StatusMessage,
@@ -32,12 +31,6 @@ from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
-
-DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
-SIZES = (  # of age, words and figures, where there is little room, and plenty
-    (TextSize.TITLE, TextSize.SMALL, TextSize.BODY),
-    (TextSize.DISPLAY, TextSize.BODY, TextSize.LEAD),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +97,6 @@ class LastResultPanel(Translated, QGroupBox):
         self._withdrawal.declined.connect(self._take_back.setFocus)
 
         self._retranslate()
-
-    def set_room(self, room: SizeClass) -> None:
-        """Scale its figures to the size of the window."""
-        age, words, figures = SIZES[room.is_large]
-        set_size(self._age, age)
-        set_size(self._when, words)
-        self._table.set_letters(figures)
 
     def set_value(self, value: LastResult) -> None:
         """Show another result, or why there is none."""
@@ -242,15 +228,7 @@ class LastResultPanel(Translated, QGroupBox):
         days = (now.date() - local_time(result.accepted).date()).days
         if days < 0:
             return self.tr("In the future")
-        if days == 0:
-            return self.tr("Today")
-        if days == 1:
-            return self.tr("Yesterday")
-        if days < 2 * DAYS_IN_MONTH:
-            return self.tr("{0} days ago").format(days)
-        if days < 2 * DAYS_IN_YEAR:
-            return self.tr("{0} months ago").format(days // DAYS_IN_MONTH)
-        return self.tr("{0} years ago").format(days // DAYS_IN_YEAR)
+        return age_text(days)
 
 
 class LastResultPresenter(QObject):

@@ -1,18 +1,14 @@
 """The first view of a new user, and the set-up of a station."""
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from string import Template
 
-import numpy as np
 from PySide6.QtCore import QObject, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen.model.pen import Pen
-from lightpen.model.rigid import Posture
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.layouts import (
     fill,
@@ -27,7 +23,6 @@ from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.controls import PushButton, open_folder
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.pen_in_space import DisplayedPosture, PenInSpace
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.selection import TRIAL, is_trial_ready
@@ -168,12 +163,6 @@ class SetupView(Translated, QWidget):
 
 LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture
 WORDS_HEIGHT = 21 * GRID  # px, with the margins
-LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
-RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
-COLUMNS = (0, (0, 60, 120, 180), -30), (-25, (20, 90, 160), 0), (25, (35, 105, 170), 0)
-LEDS = np.array([(x, y, z) for x, column, z in COLUMNS for y in column], np.float64)
-PEN = Pen(LEDS, np.tile([0.0, 0.0, 1.0], (len(LEDS), 1)))
-SHOWN = DisplayedPosture(PEN, np.array([0.0, -90.0, -25.0]), LEANING, RIGHT)
 
 
 class WelcomeView(Translated, QWidget):
@@ -187,9 +176,7 @@ class WelcomeView(Translated, QWidget):
         super().__init__()
 
         # Widgets
-        pen = PenInSpace()
-        pen.set_value(SHOWN)
-        self.trial = _Card(pen)
+        self.trial = _Card(_Drawing("trial"))
         self._images = _Card(_Drawing("images"))
         self._station = _Card(_Drawing("station"))
 

@@ -21,7 +21,6 @@ from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.bars import Question
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.pen_in_space import DisplayedPosture
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.swing_run import SwingRun
@@ -70,7 +69,6 @@ class SwingPageState:
     operator_value: OperatorValue
     note: str  # images that are not counted
     warning: StatusMessage
-    pen_posture: DisplayedPosture | None  # posture of the drawn pen
     is_verdict: bool
     is_capturing: bool
     has_fault: bool
@@ -158,7 +156,6 @@ class SwingPresenter(QObject):
             operator_value=shown,
             note="" if view is None else words.note(view),
             warning=StatusMessage() if view is None else words.warning(view),
-            pen_posture=None if view is None else words.pen_posture(view),
             is_verdict=is_verdict,
             is_capturing=status.is_capturing,
             has_fault=status.has_fault,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QTabBar, QWidget
 from typing_extensions import override
 
@@ -28,16 +28,14 @@ from lightpen_app.widgets.fitting import (
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.pen_in_space import PenInSpace
 from lightpen_app.widgets.plots import Curve, TracePlot
 from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.state_banner import SignLabel, StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 
 DIAL_SHARE, SMALL_DIAL_SHARE, SIDE_SHARE = 2, 3, 3  # of the width
-SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
+SIDE_SHARES = (9, 7)  # of it: numbers, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
-LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -48,7 +46,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
     """Shows a snapshot of a swing."""
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
-    large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -84,7 +81,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             QProgressBar(maximum=PROGRESS_STEPS, textVisible=False), self.tr("Progress")
         )
         self._banner = StateBanner(TextSize.TITLE)
-        self._pen = PenInSpace()
         self._image = ImageView()
         self._image.setMinimumWidth(LEAST_IMAGE)
         self._plots = LazyWidget(_make_plots)
@@ -96,7 +92,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._side = grid_layout(self._body, at=(0, 1), spacing=2 * GRID)
         numbers = (self._count, self._progress, self._note, 1)
         self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
-        self._side.addWidget(self._pen, 0, 1)
         self._body.setRowStretch(0, 1)
         self._body.setColumnStretch(1, SIDE_SHARE)
         self._scroll = PageScroll()
@@ -142,7 +137,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         """Show a snapshot of a swing."""
         self.set_value(state.value, state.note, is_verdict=state.is_verdict)
         self._warning.set_value(state.warning)
-        self._pen.set_value(state.pen_posture)
         self.side.setText(side_text(state.side))
         self.side.set_why_not(state.why_not_side)
         self.swapped.setVisible(state.knows_side)
@@ -168,13 +162,13 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         """Place the plots beside the dial, or below it in a small window."""
         is_small = self._is_small
         if is_small:
-            self._side.addWidget(self._banner, 1, 0, 1, 3)
+            self._side.addWidget(self._banner, 1, 0, 1, 2)
             self._body.addWidget(self._plots, 1, 0, 1, 2)
             self._body.addWidget(self._image, 2, 0, 1, 2)
         else:
             self._numbers.addWidget(self._banner)
-            self._side.addWidget(self._plots, 1, 0, 1, 3)
-            self._side.addWidget(self._image, 0, 2)
+            self._side.addWidget(self._plots, 1, 0, 1, 2)
+            self._side.addWidget(self._image, 0, 1)
         share = SMALL_DIAL_SHARE if is_small else DIAL_SHARE
         self._body.setColumnStretch(0, share)
         self._share_room()
@@ -188,20 +182,14 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             each.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
             each.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
         self._content.set_squeezed(not is_small)
-        is_large = self._room.is_large
-        self._instruction.setMinimumHeight(
-            (5 if is_small else 9 if is_large else 7) * GRID
-        )
-        usual = TextSize.TITLE if is_small else TextSize.DISPLAY
-        self._count.set_largest(TextSize.HUGE if is_large else usual)
+        self._instruction.setMinimumHeight((5 if is_small else 7) * GRID)
+        self._count.set_largest(TextSize.TITLE if is_small else TextSize.DISPLAY)
 
     def _share_room(self) -> None:
-        """Divide the space beside the dial among numbers, pen, image and plots."""
+        """Divide the space beside the dial among numbers, image and plots."""
         columns, rows = SIDE_SHARES, ROW_SHARES
         if self._is_small:
-            columns, rows = (*columns[:2], 0), (1, 0)
-        elif self._room.is_large:
-            columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
+            columns, rows = (1, 0), (1, 0)
         for column, share in enumerate(columns):
             self._side.setColumnStretch(column, share)
         for row, share in enumerate(rows):

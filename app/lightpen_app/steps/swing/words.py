@@ -30,7 +30,6 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, time_left_text
 from lightpen_app.steps.swing.view_state import ENDED, SwingViewState
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.pen_in_space import DisplayedPosture
 from lightpen_app.widgets.posture_dial import DialValue
 from lightpen_app.widgets.state_banner import State, StatusMessage
 
@@ -135,15 +134,6 @@ class SwingWords(QObject):
         if why is None or not is_asked or view.state.phase is Phase.VERDICT:
             return StatusMessage()
         return StatusMessage.warning(worded(why))
-
-    def pen_posture(self, view: SwingViewState) -> DisplayedPosture | None:
-        """Return the posture of the drawn pen; None if its tip is unknown."""
-        pen, seat = view.setup.pen, view.state.kept.seat or view.state.seat
-        tip = pen.nominal_tip if seat is None else seat.tip_pen
-        if tip is None:
-            return None
-        dial = view.dial
-        return DisplayedPosture(pen, tip, dial.posture, dial.target, dial.heading)
 
     def _current_instruction(self, view: SwingViewState) -> Instruction:
         state = view.state

@@ -42,7 +42,7 @@ from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.preparation import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.swing_recorder import record_header
-from lightpen_app.look.theme import TextSize, Tone
+from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.start.day_view import DayView, TemperatureField
@@ -53,7 +53,6 @@ from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel
-from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
@@ -587,29 +586,6 @@ def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
     assert (age, verdict) == ("12 days ago", "PASS")
     assert when.endswith("  \u00b7  Ann")
     assert table == ["x -1.3182 0.0031", "y -90.4095 0.0121", "z -23.8548 0.0998"]
-
-
-def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
-    show: Show, workbench: Workbench
-) -> None:
-    accepted(workbench, timedelta(days=12))
-    page = show(workbench).page
-
-    def letters() -> tuple[int, int]:
-        labels = page.findChildren(QLabel)
-        (age,) = (label for label in labels if label.text() == "12 days ago")
-        (table,) = page.findChildren(NumberTable)
-        age.ensurePolished()
-        table.ensurePolished()
-        return age.fontInfo().pixelSize(), table.fontInfo().pixelSize()
-
-    page.resize(1000, 640)
-    small = letters()
-    page.resize(1616, 870)
-    large = letters()
-
-    assert small == (TextSize.TITLE, TextSize.BODY)
-    assert large == (TextSize.DISPLAY, TextSize.LEAD)
 
 
 def test_a_tip_that_was_to_be_checked_stays_amber_with_its_reason(

@@ -87,8 +87,7 @@ def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
 @pytest.mark.parametrize(
     ("days", "age"),
     [
-        *((0, "Today"), (1, "Yesterday"), (2, "2 days ago"), (59, "59 days ago")),
-        *((60, "2 months ago"), (729, "24 months ago"), (730, "2 years ago")),
+        *((0, "Today"), (1, "Yesterday"), (2, "2 days ago"), (730, "730 days ago")),
         (-400, "In the future"),
     ],
 )

@@ -17,32 +17,25 @@ COUNT = "60 of about 80 images"
 INSTRUCTION = "Tilt right"
 
 
-def test_dial_image_and_letters_grow_with_the_screen(qtbot: QtBot) -> None:
+def test_dial_and_image_grow_with_the_screen(qtbot: QtBot) -> None:
     face = SwingView()
     qtbot.addWidget(face)
     face.set_value(OperatorValue(instruction=INSTRUCTION, count=COUNT, fraction=0.4))
     face.show()
 
-    def sizes(width: int, height: int) -> tuple[float, ...]:
+    def sizes(width: int, height: int) -> tuple[float, float]:
         face.resize(width, height)
         QApplication.processEvents()
         image = face.findChild(ImageView)
         assert isinstance(image, ImageView)
-        letters = [
-            text.size_px()
-            for text in face.findChildren(FittedText)
-            if text.text() in (COUNT, INSTRUCTION)
-        ]
         dial = min(face.dial.width(), face.dial.height())
-        return (dial, min(image.width(), image.height()), *letters)
+        return (dial, min(image.width(), image.height()))
 
     small, large, larger = sizes(976, 580), sizes(1616, 830), sizes(3536, 1900)
 
     for one, other in ((small, large), (large, larger)):
         assert one[0] < other[0], (small, large, larger)
         assert one[1] < other[1], (small, large, larger)
-    assert all(a < b for a, b in zip(small[2:], large[2:], strict=True))
-    assert large[1] > 1.5 * small[1]  # the live image, 200 px and more
 
 
 @pytest.mark.parametrize(

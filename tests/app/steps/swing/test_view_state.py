@@ -154,16 +154,6 @@ def test_spots_that_do_not_match_the_pen_point_to_its_file_before_the_swing(
     assert words.warning(replace(at_verdict(), has_unfit_spots=True)) == StatusMessage()
 
 
-def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
-    value = words.pen_posture(at_verdict())
-
-    assert value is not None
-    assert value.target is not None
-    np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
-    nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
-    assert words.pen_posture(replace(at_verdict(), setup=nobody)) is None
-
-
 def test_after_the_capture_no_limit_is_named_but_what_was_rejected(
     words: SwingWords,
 ) -> None:
