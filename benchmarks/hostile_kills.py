@@ -157,7 +157,7 @@ def _swings_are_whole(data: Path, reported: list[str]) -> bool:
 
 def _sound_images(folder: Path) -> set[int]:
     record = open_record(folder)
-    for load_image in source(record).images.open():
+    for load_image in source(record).images[0].open():
         load_image()
     return set(record.all_numbers.tolist())
 

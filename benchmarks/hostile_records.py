@@ -232,7 +232,7 @@ def _is_named(read: Callable[[], object], file: Path) -> bool:
 
 def _read_all(swing: Path) -> None:
     """Read a record with all of its images."""
-    for load in source(open_record(swing)).images.open():
+    for load in source(open_record(swing)).images[0].open():
         load()
 
 

@@ -143,7 +143,7 @@ class MonteCarloRow(Translated, BudgetRow):
             self._table.set_value(self._figures(self._found))
 
     def _why_not(self) -> str:
-        if self._solution is not None and self._solution.source.rig is not None:
+        if self._solution is not None and self._solution.source.rig.n_cameras > 1:
             return self.tr("Available for swings with one camera only.")
         return ""
 

@@ -21,22 +21,17 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.detection.observations import (
-    Observations,
-    leave_out,
-    observe_centers,
-    observe_images,
-)
+from lightpen.detection.observations import Observations, leave_out
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_centers, observe_rig_images
 from lightpen.errors import UsageError
-from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.summary import calibration_text, convergence_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import is_simulated
-from lightpen.formats.observation_files import pair_images
+from lightpen.formats.observation_files import Pairing, pair_images
 from lightpen.formats.opened_files import Inputs, RigInputs, all_hashed, with_content
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
@@ -46,7 +41,7 @@ from lightpen.model.camera import Camera, unmodelled_effects_of
 from lightpen.model.limits import SwingLimits
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import of_camera
+from lightpen.model.rigid import Rig, of_camera, rig_of
 from lightpen.record.recomputing import recompute
 from lightpen.record.swings.reading import (
     is_record,
@@ -87,8 +82,6 @@ def _calibrate(options: argparse.Namespace) -> None:
         calibrated = _from_json(options)
     elif len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
-    elif options.rig is not None:
-        calibrated = _from_rig(options)
     else:
         calibrated = _from_observations(options)
     calibration = calibrated.calibration
@@ -174,32 +167,47 @@ def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") ->
 
 
 def _from_observations(options: argparse.Namespace) -> _Calibrated:
-    for name, file in (("--camera", options.camera), ("--pen", options.pen)):
+    """Calibrate by images or centres of one camera, or of those of a rig."""
+    if options.rig is not None and options.camera is not None:
+        raise UsageError("cli.rig-and-camera")
+    for name, file in (
+        ("--camera", options.rig or options.camera),
+        ("--pen", options.pen),
+    ):
         if file is None:
             raise lacking(name)
-    camera = read_camera(options.camera)
-    _note_doubts(camera, options)
-    pen = _read_pen(options)
-    if options.centers is not None:
-        _require_one_each(options.centers, 1, RIG_NEEDED)
-        given = [str(options.centers[0])]
+    camera_files: tuple[Path, ...] = (options.camera,)
+    if options.rig is None:
+        rig = rig_of(read_camera(options.camera))
     else:
-        if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
-            _require_one_each(options.images, 1, RIG_NEEDED)
-        given = options.images
-    observations, files = _observe(options, camera, pen, given)
-    observations = _timed(_part_of(observations, options), options)
-    origin = _origin(options.camera, options.pen, *files)
+        rig_file = read_rig(options.rig)
+        rig, camera_files = rig_file.rig, rig_file.camera_files
+    for c, camera in enumerate(rig.cameras):
+        _note_doubts(camera, options, rig.names[c] if rig.names else "")
+    pen = _read_pen(options)
+    observations, files = _observe(options, rig, pen)
+    beside = () if options.rig is None else (options.rig,)
+    origin = _origin(options.pen, *beside, *camera_files, *files)
     return _Calibrated(
-        calibrate(camera, pen, observations, assumptions_of(options)),
+        calibrate_rig(
+            rig,
+            pen,
+            [_timed(_part_of(each, options), options) for each in observations],
+            assumptions_of(options),
+        ),
         pen.nominal_tip,
         SwingLimits(),
         origin,
         lambda: Inputs(
-            camera=with_content(options.camera),
+            camera=with_content(camera_files[0]),
             pen=with_content(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
+            rig=None
+            if options.rig is None
+            else RigInputs(
+                with_content(options.rig), tuple(map(with_content, camera_files))
+            ),
             origin=origin,
             units=options.units,
             led_diameter=options.led_diameter,
@@ -235,62 +243,6 @@ def _read_pen(options: argparse.Namespace) -> Pen:
     return read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
 
 
-def _from_rig(options: argparse.Namespace) -> _Calibrated:
-    if options.camera is not None:
-        raise UsageError("cli.rig-and-camera")
-    if options.pen is None:
-        raise lacking("--pen")
-    rig_file = read_rig(options.rig)
-    rig = rig_file.rig
-    for name, camera in zip(rig.names, rig.cameras, strict=True):
-        _note_doubts(camera, options, name)
-    pen = _read_pen(options)
-    in_order = message(
-        "cli.one-of-each-camera", n_cameras=rig.n_cameras, names=", ".join(rig.names)
-    )
-    if options.centers is not None:
-        _require_one_each(options.centers, rig.n_cameras, in_order)
-        centers = [centers_at(file, pen) for file in options.centers]
-        files: tuple[Path, ...] = tuple(options.centers)
-        pairing = pair_images([list(map(str, c.frames)) for c in centers], rig.names)
-        observations = observe_rig_centers(centers, pairing, rig, pen)
-    else:
-        _require_one_each(options.images, rig.n_cameras, in_order)
-        sources = [images_at(p).of_bits(options.bits) for p in options.images]
-        files = tuple(file for source in sources for file in source.files)
-        require_other_file(options.json, *files, *rig_file.camera_files)
-        pairing = pair_images([source.names for source in sources], rig.names)
-        with progress("Finding LEDs") as report:
-            observations = observe_rig_images(sources, pairing, rig, pen, report)
-    if pairing.by_order:
-        note(message("rig.paired-by-order"))
-    origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
-    return _Calibrated(
-        calibrate_rig(
-            rig,
-            pen,
-            [_timed(_part_of(each, options), options) for each in observations],
-            assumptions_of(options),
-        ),
-        pen.nominal_tip,
-        SwingLimits(),
-        origin,
-        lambda: Inputs(
-            camera=with_content(rig_file.camera_files[0]),
-            pen=with_content(options.pen),
-            observations=all_hashed(files),
-            nominal_tip=pen.nominal_tip,
-            rig=RigInputs(
-                with_content(options.rig),
-                tuple(map(with_content, rig_file.camera_files)),
-            ),
-            origin=origin,
-            units=options.units,
-            led_diameter=options.led_diameter,
-        ),
-    )
-
-
 def _require_one_each(
     given: Sequence[str | Path], n_cameras: int, why: Message
 ) -> None:
@@ -303,15 +255,40 @@ def _require_one_each(
 
 
 def _observe(
-    options: argparse.Namespace, camera: Camera, pen: Pen, given: Sequence[str]
-) -> tuple[Observations, tuple[Path, ...]]:
-    """Return the observations of images or of a file of centres, and their files."""
+    options: argparse.Namespace, rig: Rig, pen: Pen
+) -> tuple[Sequence[Observations], tuple[Path, ...]]:
+    """Return the observations of each camera, and the files of images or centres."""
+    places: Sequence[str | Path] = options.centers or options.images
+    needed = RIG_NEEDED
+    if options.rig is not None:
+        names = ", ".join(rig.names)
+        needed = message("cli.one-of-each-camera", n_cameras=rig.n_cameras, names=names)
+    # Images of one camera may be given one by one, as a shell makes them of a pattern.
+    each: list[Sequence[str]] = [[str(place)] for place in places]
+    is_pattern = options.centers is None and not any(map(os.path.isdir, places))
+    if options.rig is None and is_pattern:
+        each = [list(map(str, places))]
+    else:
+        _require_one_each(places, rig.n_cameras, needed)
     if options.centers is not None:
-        path = Path(given[0])
-        require_other_file(options.json, path)
-        centers = centers_at(path, pen)
-        return observe_centers(centers, camera, pen), (path,)
-    source = images_at(*given).of_bits(options.bits)
-    require_other_file(options.json, *source.files)
+        files = tuple(options.centers)
+        require_other_file(options.json, *files)
+        centers = [centers_at(file, pen) for file in files]
+        pairing = _paired([list(map(str, c.frames)) for c in centers], rig)
+        return observe_rig_centers(centers, pairing, rig, pen), files
+    sources = [images_at(*given).of_bits(options.bits) for given in each]
+    files = tuple(file for source in sources for file in source.files)
+    require_other_file(options.json, *files)
+    pairing = _paired([source.names for source in sources], rig)
     with progress("Finding LEDs") as report:
-        return observe_images(source, camera, pen, report), source.files
+        return observe_rig_images(sources, pairing, rig, pen, report), files
+
+
+def _paired(names: Sequence[Sequence[str]], rig: Rig) -> Pairing:
+    """Return which images are simultaneous, and say if only their order tells."""
+    if rig.n_cameras == 1:
+        return Pairing(np.arange(len(names[0]))[:, None])
+    pairing = pair_images(names, rig.names)
+    if pairing.by_order:
+        note(message("rig.paired-by-order"))
+    return pairing

@@ -35,7 +35,7 @@ def observe_rig_images(
     """Find and label the LEDs in simultaneous images of a rig; see `observe_images`.
 
     Observations are of each camera, all of the same moments, with a mask of stray light
-    each. A camera whose images are refused is named.
+    each. A camera of several whose images are refused is named.
     """
     seen = []
     for c, source in enumerate(sources):
@@ -47,8 +47,12 @@ def observe_rig_images(
             mask = None if masks is None else masks[c]
             seen.append(observe_images(source, rig.cameras[c], pen, part, mask=mask))
         except FileError as error:
+            if not rig.names:
+                raise
             raise FileError(_with_exchange(rig, c, error.message)) from error
         except CalibrationError as error:
+            if not rig.names:
+                raise
             fault = of_camera(rig.names[c], error.message)
             raise CalibrationError(fault) from error
     return at_moments(seen, pairing)
@@ -59,13 +63,15 @@ def observe_rig_centers(
 ) -> tuple[Observations, ...]:
     """Take LED centres that were found elsewhere; see `observe_centers`.
 
-    A camera whose centres are refused is named.
+    A camera of several whose centres are refused is named.
     """
     seen = []
     for c, each in enumerate(centers):
         try:
             seen.append(observe_centers(each, rig.cameras[c], pen))
         except FileError as error:
+            if not rig.names:
+                raise
             raise FileError(of_camera(rig.names[c], error.message)) from error
     return at_moments(seen, pairing)
 

@@ -205,7 +205,11 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     def _checked_by_pen(self, camera: Camera | None) -> StatusMessage:
         """Return whether the swing still agrees with the file that it was taken by."""
-        if camera is None or self._swing is None or self._swing.source.rig is not None:
+        if (
+            camera is None
+            or self._swing is None
+            or self._swing.source.rig.n_cameras > 1
+        ):
             return StatusMessage()
         used = self._swing.source.camera
         if not np.array_equal(camera.intrinsics, used.intrinsics):

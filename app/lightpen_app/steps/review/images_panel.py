@@ -290,7 +290,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         return self._solution.source, number, self._switch.value()
 
     def _is_of_rig(self) -> bool:
-        return self._solution is not None and self._solution.source.rig is not None
+        return self._solution is not None and self._solution.source.rig.n_cameras > 1
 
     def _clear_view(self) -> None:
         self._shown = None
@@ -311,7 +311,7 @@ def _decoded(solution: Solution, number: int, camera: int, report: Report) -> _D
     report(0.0)
     image = load_image(solution, number, camera)
     height, width = image.shape
-    source = (solution.source.images, *solution.source.other_images)[camera]
+    source = solution.source.images[camera]
     full_scale = source.full_scale or full_scale_of(image)
     half = pooled(image, full_scale.bit_length())
     return _Decoded(solution.source, number, camera, half, QSize(width, height))

@@ -142,11 +142,11 @@ class ResidualsPanel(PlotsPanel):
     def _show(self, solution: Solution) -> None:
         self._failed = None
         rig = solution.source.rig
-        self._switch.setVisible(rig is not None)
-        if rig is None:
+        self._switch.setVisible(rig.n_cameras > 1)
+        if rig.n_cameras == 1:
             self._switch.set_value(0)
         c = self._switch.value()
-        camera = solution.source.camera if rig is None else rig.cameras[c]
+        camera = rig.cameras[c]
         calibration = solution.calibration
         images = calibration.cameras[c]
         used = images.leds_used & calibration.used[:, None]

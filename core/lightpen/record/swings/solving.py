@@ -18,7 +18,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.cameras.pixel_formats import pixel_format_named
-from lightpen.detection.observations import Observations, leave_out, observe_images
+from lightpen.detection.observations import Observations, leave_out
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_images
 from lightpen.errors import CalibrationError, FileError
@@ -53,8 +53,9 @@ class RecordSource:
     """Inputs of a calibration."""
 
     folder: Path
-    images: ImageSource  # in the order of capture; loading raises `FileError`
-    camera: Camera
+    # Of each camera, in the order of capture; loading raises `FileError`.
+    images: tuple[ImageSource, ...]
+    rig: Rig  # of one camera, too
     pen: Pen
     masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
     camera_files: tuple[Path, ...]
@@ -64,9 +65,12 @@ class RecordSource:
     origin: Origin | None = None
     units: str | None = None  # as of `Header`
     led_diameter: float | None = None  # as in `Header`
-    rig: Rig | None = None
-    rig_file: Path | None = None
-    other_images: tuple[ImageSource, ...] = ()
+    rig_file: Path | None = None  # None of one camera
+
+    @property
+    def camera(self) -> Camera:
+        """The camera, of a rig the first one."""
+        return self.rig.cameras[0]
 
 
 def source(record: Record) -> RecordSource:
@@ -77,15 +81,16 @@ def source(record: Record) -> RecordSource:
         record.folder / copy_name(camera_stem(c), each.file)
         for c, each in enumerate(header.cameras)
     )
-    rig_file, rig = None, None
-    if header.rig_file is not None:
+    rig_file = None
+    if header.rig_file is None:
+        rig = rig_of(read_camera(camera_files[0]))
+    else:
         rig_file = record.folder / copy_name(RIG_STEM, header.rig_file)
         rig = read_rig(rig_file, camera_files).rig
-    images = [_images_of(record, c) for c in range(len(camera_files))]
     return RecordSource(
         folder=record.folder,
-        images=images[0],
-        camera=read_camera(camera_files[0]) if rig is None else rig.cameras[0],
+        images=tuple(_images_of(record, c) for c in range(rig.n_cameras)),
+        rig=rig,
         pen=read_pen(
             pen_file, header.units, header.led_diameter_mm, header.nominal_tip
         ),
@@ -97,9 +102,7 @@ def source(record: Record) -> RecordSource:
         origin=header.origin,
         units=header.units,
         led_diameter=header.led_diameter_mm,
-        rig=rig,
         rig_file=rig_file,
-        other_images=tuple(images[1:]),
     )
 
 
@@ -191,19 +194,11 @@ def solve_record(
         raise CalibrationError("record.no-images", name=record.folder.name)
     found = source(record)
     _logger.info("solving %d images of %s", len(record.images), record.folder)
-    if found.rig is None:
-        seen: tuple[Observations, ...] = (
-            observe_images(
-                found.images, found.camera, found.pen, report, mask=found.masks[0]
-            ),
-        )
-    else:
-        sources = (found.images, *found.other_images)
-        moments = np.arange(len(record.images))[:, None]
-        pairing = Pairing(np.repeat(moments, len(sources), axis=1))
-        seen = observe_rig_images(
-            sources, pairing, found.rig, found.pen, report, found.masks
-        )
+    moments = np.arange(len(record.images))[:, None]
+    pairing = Pairing(np.repeat(moments, found.rig.n_cameras, axis=1))
+    seen = observe_rig_images(
+        found.images, pairing, found.rig, found.pen, report, found.masks
+    )
     timed = tuple(replace(each, interval_ms=record.interval_ms) for each in seen)
     return _solved(found, record.all_numbers, timed, record.excluded)
 
@@ -231,8 +226,7 @@ def load_image(solution: Solution, number: int, camera: int = 0) -> Image:
     """Read an image of a solved record again, (H, W), by its number and camera."""
     index = int(np.searchsorted(solution.numbers, number))
     source = solution.source
-    images = (source.images, *source.other_images)[camera]
-    load = next(islice(images.open(), index, None))
+    load = next(islice(source.images[camera].open(), index, None))
     return load()
 
 
@@ -241,9 +235,7 @@ def record_inputs(source: RecordSource) -> Inputs:
 
     Images that are gone took no part and are not among them.
     """
-    images = [
-        file for each in (source.images, *source.other_images) for file in each.files
-    ]
+    images = [file for each in source.images for file in each.files]
     rig = None
     if source.rig_file is not None:
         cameras = tuple(map(with_content, source.camera_files))
@@ -272,7 +264,7 @@ def _solved(
         if number in excluded
     }
     calibration = calibrate_rig(
-        source.rig or rig_of(source.camera),
+        source.rig,
         source.pen,
         [leave_out(each, reasons) for each in seen],
         source.assumptions,
@@ -294,12 +286,11 @@ def _all_residuals(
 ) -> FloatArray:
     """Return the residuals of all images, (N, C, L, 2), as `Solution` has them."""
     joint, fitted = calibration.joint, calibration.bundle.state
-    cameras = (source.rig or rig_of(source.camera)).cameras
     pixels = np.stack(
         [
             steadied(camera, each, images.path).pixels
             for camera, each, images in zip(
-                cameras, seen, calibration.cameras, strict=True
+                source.rig.cameras, seen, calibration.cameras, strict=True
             )
         ],
         axis=1,

@@ -130,7 +130,7 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
         own = source(record)
         return ImageLocation(
             name=where[0],
-            images=(own.images, *own.other_images),
+            images=own.images,
             origin=record.header.origin,
             viewers=_recorded_viewers(own),
             pen=own.pen,
@@ -179,7 +179,7 @@ def point_image_name(number: int) -> str:
 
 
 def _recorded_viewers(own: RecordSource) -> PenCameras:
-    if own.rig is None or own.rig_file is None:
+    if own.rig_file is None:
         return viewers_of_camera(own.camera, own.camera_files[0])
     return PenCameras(own.rig, all_hashed([own.rig_file, *own.camera_files]))
 

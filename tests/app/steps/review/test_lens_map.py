@@ -9,6 +9,7 @@ from tests.simulated_centers import observe_pixels
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
+from lightpen.model.rigid import rig_of
 from lightpen.record.swings.solving import RecordSource, Solution
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.widgets.result_plots import ArrowPlot
@@ -33,7 +34,7 @@ def solution_with_lens(amplitude: float) -> Solution:
     seen = observe_pixels(exact + amplitude * waves, camera, pen)
     found = calibrate(camera, pen, seen)
     nothing = ImageSource((), (), lambda: iter(()))
-    source = RecordSource(Path(), nothing, camera, pen, (), (), Path())
+    source = RecordSource(Path(), (nothing,), rig_of(camera), pen, (), (), Path())
     residuals = found.joint.residuals.reshape(-1, 1, pen.n_leds, 2)
     numbers = np.arange(1, N_IMAGES + 1)
     return Solution(source, numbers, seen, {}, found, residuals)

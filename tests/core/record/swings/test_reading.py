@@ -103,7 +103,7 @@ def test_all_that_was_recorded_is_read_back_to_the_last_digit(
     np.testing.assert_array_equal(record.images[2].rig_pixels[0], pixels)
     np.testing.assert_array_equal(record.images[2].rotation, np.eye(3) / 3)
     np.testing.assert_array_equal(record.images[2].translation, np.ones(3) / 7)
-    for seed, load in enumerate(source(record).images.open()):
+    for seed, load in enumerate(source(record).images[0].open()):
         np.testing.assert_array_equal(load(), dark_image(seed))
     (camera,) = header.cameras
     camera = structs.replace(camera, file=structs.replace(camera.file, data=b""))
@@ -134,7 +134,7 @@ def test_images_of_a_record_have_the_full_scale_of_their_pixel_format(
     camera = structs.replace(camera, source=str(origin), in_use=used)
     header = structs.replace(header, cameras=(camera,))
     record = open_record(recorded(tmp_path / "swing", header, 1))
-    assert source(record).images.full_scale == full_scale
+    assert source(record).images[0].full_scale == full_scale
 
 
 def test_the_record_brings_its_own_camera_and_pen(
@@ -174,7 +174,7 @@ def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
         # At most the image in flight was written without being acknowledged.
         assert len(numbers) - len(acknowledged) <= N_KILLS
 
-    for image, load in zip(record.images, source(record).images.open(), strict=True):
+    for image, load in zip(record.images, source(record).images[0].open(), strict=True):
         np.testing.assert_array_equal(load(), dark_image(image.number))
         np.testing.assert_array_equal(
             image.rig_pixels[0], np.full((10, 2), image.number + 0.1)
@@ -202,7 +202,7 @@ def test_a_torn_line_and_an_orphan_image_are_passed_over(
 
         images = open_record(folder).images
         assert [image.number for image in images] == [1, 2, 3]
-        *_, load = source(open_record(folder)).images.open()
+        *_, load = source(open_record(folder)).images[0].open()
         np.testing.assert_array_equal(load(), dark_image(7))
         assert len(list((folder / "images").iterdir())) == 3
 
@@ -277,7 +277,7 @@ def test_one_program_at_a_time_writes_to_a_record(
     with pytest.raises(FileError, match="Another program is writing to the swing in"):
         note_excluded(folder, {1: "taken out"})
     assert len(open_record(folder).images) == 2
-    for load in source(open_record(folder)).images.open():
+    for load in source(open_record(folder)).images[0].open():
         load()
     assert before == {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
@@ -327,7 +327,7 @@ def test_an_image_changed_later_is_not_used(tmp_path: Path, header: Header) -> N
     folder = recorded(tmp_path / "swing", header, 2)
     (folder / "images" / "000002.png").write_bytes(encode_png(dark_image(99)))
 
-    first, second = source(open_record(folder)).images.open()
+    first, second = source(open_record(folder)).images[0].open()
     first()
     with pytest.raises(FileError, match=r"000002\.png was modified after recording"):
         second()
@@ -372,7 +372,7 @@ def test_images_are_taken_out_and_put_back(tmp_path: Path, header: Header) -> No
     record = open_record(tmp_path / "swing")
     assert record.numbers.tolist() == [1, 3, 4]
     assert record.excluded == {2: "tip slipped"}
-    assert len(source(record).images.names) == 4
+    assert len(source(record).images[0].names) == 4
     assert record.next_number == 5
 
 
@@ -416,7 +416,7 @@ def test_a_full_disk_is_said_and_costs_nothing_acknowledged(
     assert "cannot be written" in sentence
     record = open_record(folder)
     assert len(record.images) == int(n_acknowledged)
-    for load in source(record).images.open():
+    for load in source(record).images[0].open():
         load()
     with RecordWriter.resume(record) as writer:  # after space was made
         assert append(writer) == len(record.images) + 1
