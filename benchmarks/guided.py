@@ -16,12 +16,12 @@ from benchmarks.rows import Row
 from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import Posture, angles_between, rotations_of
 from lightpen.swing.capture.rules import advance_swing
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,

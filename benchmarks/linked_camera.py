@@ -16,8 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.gige_simulator import GigeSimulator
 
 from lightpen.arrays import Image
-from lightpen.cameras.pairing import SkippingClock
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 
 N_RENDERED = 24  # a second of a swing, shown forward and backward

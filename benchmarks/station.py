@@ -22,13 +22,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen, effective_tip
-from lightpen.model.rigid import (
-    Rig,
-    fit_rigid,
-    from_first,
-    rig_of,
-    rotation_from_vector,
-)
+from lightpen.model.rigid import Rig, fit_rigid, rig_of, rotation_from_vector
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,

@@ -16,13 +16,14 @@ from lightpen.estimation.calibrate import calibrate_rig
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import Rig, from_first, rig_of
+from lightpen.model.rigid import Rig, rig_of
 from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbingFrame,
     StillFrames,
     measure_touches,
 )
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,

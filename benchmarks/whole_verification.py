@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.estimation.calibrate import calibrate
@@ -22,7 +21,7 @@ from lightpen_extensions.measure.session import (
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import Conditions, VerificationChoices
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
 

@@ -28,13 +28,8 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import USUAL, SwingLimits
 from lightpen.model.pen import Pen, effective_tip
-from lightpen.model.rigid import (
-    Rig,
-    directions_of,
-    from_first,
-    rig_of,
-    rotation_from_vector,
-)
+from lightpen.model.rigid import Rig, directions_of, rig_of, rotation_from_vector
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,

@@ -40,7 +40,6 @@ from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
 from lightpen.archive.chains import Event, Kind, append
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats, sealed
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen
 from lightpen.estimation.reports.verdict import Grade
@@ -72,7 +71,11 @@ from lightpen_extensions.measure.session import (
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
-from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
+from lightpen_extensions.simulator.camera import (
+    GuidedOperator,
+    SimulatedCamera,
+    SkippingClock,
+)
 from lightpen_extensions.simulator.hand import (
     SimulatedOperator,
     lean_vectors,

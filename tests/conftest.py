@@ -559,7 +559,6 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     """Record a guided swing of the simulated pen, seen with a quarter of the pixels."""
     from dataclasses import replace
 
-    from lightpen.cameras.pairing import SkippingClock
     from lightpen.cameras.protocol import CameraSettings
     from lightpen.detection.pen_detection import PenDetection, detect_pen
     from lightpen.formats.opened_files import CameraFile, PenFile
@@ -571,7 +570,11 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     from lightpen.swing.capture.state import start_swing
     from lightpen.swing.preparation import Preparation, SecondCamera
     from lightpen.swing.swing_recorder import capture_image, record_header
-    from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
+    from lightpen_extensions.simulator.camera import (
+        GuidedOperator,
+        SimulatedCamera,
+        SkippingClock,
+    )
     from lightpen_extensions.simulator.scene_files import write_sample_files
     from lightpen_extensions.simulator.scenes import Scene
     from lightpen_extensions.simulator.simulator import SceneSimulator

@@ -17,7 +17,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
 from lightpen.model.fisheye import LensField
 from lightpen.model.pen import Pen, effective_tip, grown
-from lightpen.model.rigid import from_first, rotation_from_vector
+from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,

@@ -18,9 +18,10 @@ from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.messages import Message
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.rigid import rig_of
-from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.folder import TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.comparisons.assessment import CONCLUSION
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.probing.probing import ProbingPhase

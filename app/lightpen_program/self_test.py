@@ -24,12 +24,12 @@ from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen import calibrate, detect, find_images, read_camera, read_pen, reported
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.live.sources import SourceEnvironment
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
 from lightpen_app.work.settings import Settings
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.scene_files import write_scene
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator

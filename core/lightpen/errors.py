@@ -36,10 +36,6 @@ class NoArchiveError(ArchiveError):
     """There is no archive, or nothing was ever entered in it."""
 
 
-class StreamError(LightpenError):
-    """Poses cannot be streamed as requested."""
-
-
 class UsageError(LightpenError):
     """The request contradicts itself or lacks something."""
 

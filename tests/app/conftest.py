@@ -48,7 +48,6 @@ from tests.app.disk import disk_watch
 from tests.app.patience import PATIENCE_MS
 from typing_extensions import override
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.header import Names
@@ -61,6 +60,7 @@ from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.work.job import Report, collect_if_due
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator

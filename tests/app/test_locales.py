@@ -27,7 +27,7 @@ from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
 import lightpen_extensions.simulator.camera
-from lightpen.cameras.pairing import SkippingClock
+from lightpen_extensions.simulator.camera import (SkippingClock)
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen_extensions.simulator.scenes import Scene

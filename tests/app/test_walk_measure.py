@@ -10,12 +10,13 @@ from msgspec import structs
 from PySide6.QtWidgets import QListWidget
 from tests.accepted_tip import accept_tip
 
-from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.folder import TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import RESULTS, SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
 from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
 from lightpen_app_extensions.report.control import PrintReportWindow
+from lightpen_extensions.comparisons.assessment import CONCLUSION
 from lightpen_extensions.measure.measuring.plan_checks import write_plan
 from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART

@@ -14,12 +14,13 @@ from tests.app.room import scrolled_sideways
 from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.folder import CONCLUSION, VERIFICATIONS
+from lightpen.record.folder import VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
 from lightpen_app.widgets.fitting import FRAME
 from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
+from lightpen_extensions.comparisons.assessment import CONCLUSION
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.registry import TASKS
 from lightpen_extensions.measure.tasks.task import VerificationChoices

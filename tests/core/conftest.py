@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from tests.faulty_camera import FaultyCamera
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -28,7 +27,7 @@ from lightpen.swing.preparation import Preparation, SecondCamera
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.swing_recorder import read_resumable
-from lightpen_extensions.simulator.camera import GuidedOperator
+from lightpen_extensions.simulator.camera import GuidedOperator, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene

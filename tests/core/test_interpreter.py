@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lightpen.interpreter import SEARCH_AFTER, run_program
+from lightpen_program.__main__ import SEARCH_AFTER, run_program
 
 
 @pytest.fixture(autouse=True)

@@ -26,7 +26,6 @@ from lightpen.formats.rig_files import write_camera
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.names import Origin
-from lightpen.model.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.record.folder import CalibratedCamera
 from lightpen_app.look.languages import worded
 from lightpen_app.look.theme import DARK, TextSize, Tone, font
@@ -37,6 +36,7 @@ from lightpen_app.work.live_view import LiveView
 from lightpen_app_extensions.boards.form import BoardCapture
 from lightpen_extensions.boards.boards import Board
 from lightpen_extensions.boards.calibration import CameraCalibration, calibrate_camera
+from lightpen_extensions.boards.distortion import UncertaintyMap, map_uncertainty
 from lightpen_extensions.boards.observing import Views, observe_board
 from lightpen_extensions.boards.report import intrinsics_record
 

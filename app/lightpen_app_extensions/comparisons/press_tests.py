@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from typing_extensions import override
 
 from lightpen.model.names import Origin
-from lightpen.record.calibrations import keep_bending
 from lightpen.record.library.library_changes import Author
 from lightpen.record.library.tip_library import Library
 from lightpen.swing.status import SwingStatus
@@ -16,6 +15,7 @@ from lightpen_app.look.phrases import GRADE_MARKS
 from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.comparisons.press_test import keep_bending
 
 if TYPE_CHECKING:
     from lightpen_extensions.comparisons.press_test import PressTest

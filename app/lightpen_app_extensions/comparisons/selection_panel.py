@@ -12,9 +12,8 @@ from lightpen.archive.trends import Trend, has_tip
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import InputFile
 from lightpen.formats.own_json import file_entry
-from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.model.limits import VerificationLimits
 from lightpen.model.names import Origin
-from lightpen.record.folder import attributed, keep_verification
 from lightpen_app.face import SelectionTab
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
@@ -27,7 +26,12 @@ from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.comparisons.assessment import verification_record
+from lightpen_extensions.comparisons.assessment import (
+    attributed,
+    keep_verification,
+    rule_in_words,
+    verification_record,
+)
 from lightpen_extensions.comparisons.repeatability import (
     Comparison,
     Repeatability,

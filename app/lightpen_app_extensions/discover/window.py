@@ -7,7 +7,6 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.model.pen import DISC_DIAMETER
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import (
     fill,
@@ -34,6 +33,7 @@ from lightpen_app_extensions.discover.discovery_run import (
     DiscoveryRun,
     DiscoveryState,
 )
+from lightpen_extensions.boards.distortion import map_uncertainty
 from lightpen_extensions.discover.found import TURNS_NEEDED, Discovery
 from lightpen_extensions.discover.report import remarks_of
 from lightpen_extensions.discover.scale import MeasuredLength, Request

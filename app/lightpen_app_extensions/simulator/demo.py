@@ -18,7 +18,7 @@ from PySide6.QtCore import (
     qInstallMessageHandler,
 )
 
-from lightpen.cameras.pairing import MachineClock, SkippingClock
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.sources import Simulator, SourceEnvironment
@@ -41,6 +41,7 @@ from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.work.settings import Settings, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.camera import SkippingClock
 
 NAMES = Names(
     station="Demo", operator="Demo", pen="SIM-1", tip="T-1", cone="C-1",

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from dataclasses import replace
 from statistics import median
-from threading import Event, Lock
+from threading import Event
 from typing import Protocol
 
 import numpy as np
@@ -284,32 +284,4 @@ class MachineClock:
         if wake is not None:
             return wake.wait(seconds)
         time.sleep(max(seconds, 0.0))
-        return False
-
-
-class SkippingClock:
-    """A clock that advances only by waiting, at once.
-
-    With it a simulated hour takes as long as its images take to make, and the same
-    calls give the same images. If it ``rests``, a wait that can be interrupted takes
-    real time, so that a camera without a reader does not occupy the processor.
-    """
-
-    is_real = False
-
-    def __init__(self, *, rests: bool = False) -> None:
-        self._rests = rests
-        self._now_ns = 0
-        self._lock = Lock()
-
-    def now_ns(self) -> int:
-        """Return the sum of all waits, ns."""
-        return self._now_ns
-
-    def wait(self, seconds: float, wake: Event | None = None) -> bool:
-        """Advance by ``seconds`` unless ``wake`` is set; return whether it is."""
-        if wake is not None and wake.wait(max(seconds, 0.0) if self._rests else 0.0):
-            return True
-        with self._lock:
-            self._now_ns += round(max(seconds, 0.0) * 1e9)
         return False

@@ -357,11 +357,6 @@ WorkerEvent: TypeAlias = (
 )
 
 
-def not_found(place: str, why: str = "") -> DeviceNotFound:
-    """Return the error of a camera that was not found."""
-    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")
-
-
 def busy(place: str) -> DeviceBusy:
     """Return the error of a camera in use by another program."""
     return DeviceBusy("camera.busy", place=place)

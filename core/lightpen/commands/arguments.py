@@ -141,25 +141,6 @@ def use_window(options: argparse.Namespace) -> None:
     note(message("cli.window-written", file=options.camera))
 
 
-def add_camera_and_pen(
-    parser: argparse.ArgumentParser,
-    *,
-    states_pen: bool = True,
-    is_required: bool = True,
-) -> None:
-    """Add ``--camera`` and ``--pen``, and the options of the pen."""
-    add_camera(parser, "intrinsics file of the camera", is_required=is_required)
-    parser.add_argument(
-        "--pen",
-        type=Path,
-        required=is_required,
-        metavar="FILE",
-        help="LED file of the pen",
-    )
-    if states_pen:
-        add_pen_options(parser)
-
-
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
     """Add ``--camera`` or ``--rig``, and ``--pen``."""
     add_camera(parser, "intrinsics file of the camera")

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias
 from msgspec import Struct
 
 from lightpen.errors import UsageError
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import A_FILE, unreadable, write_whole
 from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.observation_files import Centers, read_centers
@@ -22,12 +21,6 @@ from lightpen.messages import Message, printable
 from lightpen.model.pen import Pen
 
 DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK, NOT_THE_TIP = 0, 1, 2, 3, 4, 5
-STATUSES = {
-    Grade.REPEAT: TO_REPEAT,
-    Grade.CHECK: TO_CHECK,
-    Grade.SCALE: NOT_THE_TIP,
-    Grade.STEADY: NOT_THE_TIP,
-}
 LINE_INTERVAL = 15.0  # s, of lines of progress
 BAR_WIDTH = 72  # characters
 
@@ -67,13 +60,6 @@ def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
         return DONE if status is None else status
 
     return run
-
-
-def verdict_status(options: argparse.Namespace, grade: Grade | None) -> int:
-    """Return the exit status of a verdict, if it is requested."""
-    if grade is None or not options.exit_by_verdict:
-        return DONE
-    return STATUSES.get(grade, DONE)
 
 
 def require_other_file(record: Path | None, *inputs: Path | None) -> None:

@@ -13,7 +13,6 @@ from lightpen.detection.observations import (
     observe_centers,
     observe_images,
 )
-from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pose import CameraReprojection, Poses, fit_reprojection
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, FileError
@@ -187,42 +186,3 @@ def fit_rig_poses(
     )
     problem = cameras[0] if rig.n_cameras == 1 else RigReprojection(rig, cameras)
     return fit_reprojection(problem, rotations, translations)
-
-
-def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
-    """Return the detection of a moment with one pose rig_from_pen by all cameras.
-
-    A camera without a pose, or with a blurred image, is ignored; if none is left, the
-    detection is returned as it is.
-    """
-    views = (detection, *detection.others)
-    if len(views) == 1:
-        return detection
-    fit = [view.has_pose and not view.is_blurred for view in views]
-    if not any(fit):
-        return detection
-    nowhere = np.full_like(detection.pixels, np.nan)
-    clean = [
-        view if is_fit else replace(view, pixels=nowhere)
-        for view, is_fit in zip(views, fit, strict=True)
-    ]
-    start = fit.index(True)
-    back = rig.rotations[start].T
-    poses = fit_rig_poses(
-        rig,
-        pen,
-        np.stack([view.pixels for view in clean])[None],
-        (back @ views[start].rotation)[None],
-        (back @ (views[start].translation - rig.translations[start]))[None],
-    )
-    return replace(
-        clean[0],
-        reason=Reason.NONE,
-        rotation=poses.rotations[0],
-        translation=poses.translations[0],
-        cofactors=poses.covariances[0] / poses.sigma**2,
-        sigma=poses.sigma,
-        spots=views[start].spots,
-        labels=views[start].labels,
-        others=tuple(clean[1:]),
-    )

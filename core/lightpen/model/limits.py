@@ -202,14 +202,6 @@ LIMITS = tuple(
 )
 
 
-def rule_in_words(limits: VerificationLimits) -> Message:
-    """Return the decision rule of verifications."""
-    rule = rule_name(limits.rule)
-    if limits.rule is DecisionRule.RISK:
-        return message("decision-rule.by-risk", rule=rule, risk=limits.risk)
-    return message("decision-rule.by", rule=rule)
-
-
 COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 
 

@@ -1,6 +1,6 @@
 """Rigid transformations, postures, and the cameras of a rig."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -166,14 +166,6 @@ class Rig:
 def rig_of(camera: Camera) -> Rig:
     """Return the rig of one camera alone."""
     return Rig((camera,), np.eye(3)[None], np.zeros((1, 3)))
-
-
-def from_first(rig: Rig) -> Rig:
-    """Return a rig without covariance, expressed in the frame of its first camera."""
-    rotations = rig.rotations @ rig.rotations[0].T
-    translations = rig.translations - rotations @ rig.translations[0]
-    rotations[0], translations[0] = np.eye(3), 0.0  # exactly, whatever was rounded
-    return replace(rig, rotations=rotations, translations=translations)
 
 
 def of_camera(name: str, fault: Message) -> Message:

@@ -14,7 +14,6 @@ from lightpen.arrays import FloatArray
 SAME = 0.02  # px, of one centre found twice in an image
 MIN_SHARED = 5  # images; fewer count little
 EXACT_SCALE = 1e-6  # relative, of a pen whose lengths are in its LED covariance
-MAX_MARKS = 1000  # images
 MARK_DIGITS = 3  # of a mark in a file, px
 
 
@@ -35,14 +34,6 @@ class FoundCamera:
     marks: FloatArray  # (M, 2), an LED centre of each of these images, px
     intrinsics: FloatArray  # (k,), as `Camera.intrinsics`
     covariance: FloatArray | None  # (k, k), None if it was not stated
-
-
-def marks_of(pixels: FloatArray) -> FloatArray:
-    """Return an LED centre of each image, (M, 2), px, from centres (N, L, 2)."""
-    seen = np.isfinite(pixels[..., 0])
-    images = np.flatnonzero(seen.any(axis=1))
-    images = images[:: -(-len(images) // MAX_MARKS) or 1]
-    return np.asarray(pixels[images, seen[images].argmax(axis=1)])
 
 
 def are_shared(marks: FloatArray, pixels: FloatArray) -> bool:

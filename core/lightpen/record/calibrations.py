@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from msgspec import structs
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.spots import EXACT_SIGMA
@@ -37,21 +36,13 @@ from lightpen.formats.own_json import (
     has_checksum,
     parse_checked,
 )
-from lightpen.local_time import local_now, local_time
+from lightpen.local_time import local_time
 from lightpen.messages import Message, message, printable
-from lightpen.model.bending import ASSUMED_BENDING, Bending, MeasuredBending
 from lightpen.model.limits import StationLimits
 from lightpen.model.names import Origin
 from lightpen.record.library.entered_files import entered_files
-from lightpen.record.library.library_changes import Author, add_item, change_item
 from lightpen.record.library.supervision import read_supervision
-from lightpen.record.library.tip_library import (
-    AnyItem,
-    ItemKind,
-    Library,
-    ListedTip,
-    read_library,
-)
+from lightpen.record.library.tip_library import AnyItem, ItemKind, Library
 from lightpen.record.results.result_folder import FolderArchive, data_folder_of
 from lightpen.record.results.results import CALIBRATION, JudgedCalibration, parse_result
 from lightpen.record.swings.header import Header, Names
@@ -361,25 +352,3 @@ def status_of(file: CalibrationFile) -> tuple[str, ...]:
     if file.is_entered is False:
         own.append(NOT_ENTERED)
     return (*own, *file.library_status)
-
-
-def bending_of(calibration: CalibrationFile, data: Path | None = None) -> Bending:
-    """Return the bending of a tip today.
-
-    By the library of a data folder, by default that of the result. The library knows
-    no simulated tip.
-    """
-    data = data or data_folder_of(calibration.path)
-    if data is None or calibration.origin is Origin.SIMULATED:
-        return ASSUMED_BENDING
-    return read_library(data).bending_of(calibration.names.tip, local_now().date())
-
-
-def keep_bending(
-    data: Path, tip: str, bending: MeasuredBending, by: Author, now: datetime
-) -> Library:
-    """Store a press test with its tip in the library; see `add_item`."""
-    listed = read_library(data).tips.get(tip)
-    if listed is None:
-        return add_item(data, ListedTip(id=tip, bending=bending), by, now)
-    return change_item(data, structs.replace(listed, bending=bending), by, now, listed)

@@ -31,7 +31,6 @@ from lightpen.formats.part_files import sweep_parts
 from lightpen.messages import message
 from lightpen.model.names import Origin
 from lightpen.record.library.entered_files import add_numbered, entered_files
-from lightpen.record.library.signing import SigningKey
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import RECORDS, RESULTS, SIMULATED
 from lightpen.record.swings.header import HEADER, Names
@@ -165,7 +164,6 @@ def _has_never_begun(folder: Path) -> bool:
 
 VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live points, session by session
-CONCLUSION = "conclusion"
 VERIFIED = "verified"  # key of the task in the settings of an entry
 MEASURED_PART: Final = "part"  # kind of the task that measures a part
 BALL_CENTRE = "ball centre"  # of a measured feature: no surface was touched
@@ -253,52 +251,9 @@ def read_verification(content: bytes, file: Path) -> StoredVerification:
     return done
 
 
-def attributed(
-    record: Mapping[str, Any], names: Names, origin: Origin | None
-) -> dict[str, Any]:
-    """Return the record of a verification with who made it where, of what."""
-    return {
-        **record,
-        "session": record["created"],
-        "station": names.station,
-        "operator": names.operator,
-        "pen": names.pen,
-        "tip": names.tip,
-        "origin": origin,
-    }
-
-
 def data_folder_of_verification(file: Path) -> Path | None:
     """Return the data folder that a file is a verification of; None of other files."""
     folder = file.absolute().parent
     if folder.name != VERIFICATIONS:
         return None
     return folder.parents[folder.parent.name == SIMULATED]
-
-
-def keep_verification(
-    data: Path,
-    record: Mapping[str, Any],
-    supervisor: SigningKey | None = None,
-    *,
-    is_simulated: bool,
-) -> Path:
-    """Keep the record of a verification in a data folder, and return its file.
-
-    The supervisor whom it names approves it.
-    """
-    folder = verifications_folder(data, is_simulated=is_simulated)
-    return add_numbered(data, folder, record_bytes(record), supervisor)
-
-
-def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
-    """Return the verifications folder of a data folder."""
-    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
-
-
-def conditions_entries(
-    temperature_c: float | None, humidity_percent: float | None
-) -> dict[str, float]:
-    """Return the measured environment as entries of a record."""
-    conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
-    return {name: each for name, each in conditions.items() if each is not None}

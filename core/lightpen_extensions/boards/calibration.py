@@ -17,7 +17,6 @@ from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import normal_quantile
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.adjustment import BoardFit
 from lightpen_extensions.boards.changes import (
     FEWEST,
@@ -34,6 +33,7 @@ from lightpen_extensions.boards.distortion import (
     Choice,
     choose_distortion,
     fit_camera,
+    map_uncertainty,
 )
 from lightpen_extensions.boards.effects import MixedFit, fit_effects, rms_together
 from lightpen_extensions.boards.observing import (

@@ -18,9 +18,8 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.model.uncertainty_map import moved_in_image
 from lightpen_extensions.boards.adjustment import BoardFit, fit_board_poses
-from lightpen_extensions.boards.distortion import fit_camera
+from lightpen_extensions.boards.distortion import fit_camera, moved_in_image
 from lightpen_extensions.boards.effects import held_out_errors
 from lightpen_extensions.boards.observing import Views, listed_names
 from lightpen_extensions.boards.start import start_board_poses

@@ -10,10 +10,9 @@ from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.adjustment import BoardFit
 from lightpen_extensions.boards.calibration import CameraCalibration
-from lightpen_extensions.boards.distortion import choice_record
+from lightpen_extensions.boards.distortion import choice_record, map_uncertainty
 from lightpen_extensions.boards.observing import ObservedBoard, Views
 from lightpen_extensions.boards.pair import PairCalibration
 

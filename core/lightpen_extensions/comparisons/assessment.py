@@ -18,12 +18,33 @@ from lightpen.formats.own_json import (
     has_checksum,
     parse_own_json,
     plain,
+    record_bytes,
     record_heading,
 )
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
-from lightpen.model.coverage import COVERAGE_FACTOR, Decision, normal_quantile
-from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.model.coverage import (
+    COVERAGE_FACTOR,
+    Decision,
+    DecisionRule,
+    normal_quantile,
+)
+from lightpen.model.limits import VerificationLimits, rule_name
+from lightpen.model.names import Origin
+from lightpen.record.folder import VERIFICATIONS
+from lightpen.record.library.entered_files import add_numbered
+from lightpen.record.library.signing import SigningKey
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.header import Names
+
+
+def rule_in_words(limits: VerificationLimits) -> Message:
+    """Return the decision rule of verifications."""
+    rule = rule_name(limits.rule)
+    if limits.rule is DecisionRule.RISK:
+        return message("decision-rule.by-risk", rule=rule, risk=limits.risk)
+    return message("decision-rule.by", rule=rule)
+
 
 USE_TIP = message("verification.use-tip")
 CALIBRATE_AGAIN = message("verification.calibrate-again")
@@ -192,3 +213,49 @@ def verdict_lines(assessment: VerificationAssessment, rule: Message) -> list[str
         f"             {assessment.next_step}",
         f"             {rule}",
     ]
+
+
+CONCLUSION = "conclusion"
+
+
+def attributed(
+    record: Mapping[str, Any], names: Names, origin: Origin | None
+) -> dict[str, Any]:
+    """Return the record of a verification with who made it where, of what."""
+    return {
+        **record,
+        "session": record["created"],
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin,
+    }
+
+
+def keep_verification(
+    data: Path,
+    record: Mapping[str, Any],
+    supervisor: SigningKey | None = None,
+    *,
+    is_simulated: bool,
+) -> Path:
+    """Keep the record of a verification in a data folder, and return its file.
+
+    The supervisor whom it names approves it.
+    """
+    folder = verifications_folder(data, is_simulated=is_simulated)
+    return add_numbered(data, folder, record_bytes(record), supervisor)
+
+
+def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
+    """Return the verifications folder of a data folder."""
+    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
+
+
+def conditions_entries(
+    temperature_c: float | None, humidity_percent: float | None
+) -> dict[str, float]:
+    """Return the measured environment as entries of a record."""
+    conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
+    return {name: each for name, each in conditions.items() if each is not None}

@@ -9,10 +9,12 @@ the two differences.
 """
 
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
@@ -24,6 +26,8 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.bending import ASSUMED, MeasuredBending, measured_on
 from lightpen.model.coverage import COVERAGE_FACTOR, chi_square_quantile
+from lightpen.record.library.library_changes import Author, add_item, change_item
+from lightpen.record.library.tip_library import Library, ListedTip, read_library
 from lightpen_extensions.comparisons.assessment import (
     BY_CHANCE,
     VerificationAssessment,
@@ -138,3 +142,13 @@ def _assessment(bending: float, uncertainty: float) -> VerificationAssessment:
         return check(said, STIFFEN)
     said = message("press-test.steady", bending=shown, uncertainty=uncertainty)
     return accepted(said, KEEP, Grade.STEADY)
+
+
+def keep_bending(
+    data: Path, tip: str, bending: MeasuredBending, by: Author, now: datetime
+) -> Library:
+    """Store a press test with its tip in the library; see `add_item`."""
+    listed = read_library(data).tips.get(tip)
+    if listed is None:
+        return add_item(data, ListedTip(id=tip, bending=bending), by, now)
+    return change_item(data, structs.replace(listed, bending=bending), by, now, listed)

@@ -20,7 +20,7 @@ from lightpen.model.coverage import COVERAGE_FACTOR, N_DIRECTIONS, dial_counts, 
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen, moved
 from lightpen.model.rigid import Posture, tilts_of
-from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
+from lightpen.model.self_calibration import FoundCamera, FoundPen
 from lightpen.swing.capture.guidance import (
     GuidanceInput,
     next_posture,
@@ -327,3 +327,14 @@ def require_certain(discovery: Discovery, sightings: Sightings) -> None:
         raise CalibrationError(
             "discover.weak-swing", U=U, focal=100 * focal, tilt=float(np.ptp(tilts))
         )
+
+
+MAX_MARKS = 1000  # images
+
+
+def marks_of(pixels: FloatArray) -> FloatArray:
+    """Return an LED centre of each image, (M, 2), px, from centres (N, L, 2)."""
+    seen = np.isfinite(pixels[..., 0])
+    images = np.flatnonzero(seen.any(axis=1))
+    images = images[:: -(-len(images) // MAX_MARKS) or 1]
+    return np.asarray(pixels[images, seen[images].argmax(axis=1)])

@@ -18,6 +18,7 @@ from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
     ConfigError,
+    DeviceNotFound,
     Frame,
     FrameIncomplete,
     FrameTimeout,
@@ -309,3 +310,8 @@ def in_sentences(
         raise setting_refused(serial, str(error)) from error
     except losses as error:
         raise lost(serial, str(error)) from error
+
+
+def not_found(place: str, why: str = "") -> DeviceNotFound:
+    """Return the error of a camera that was not found."""
+    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")

@@ -7,6 +7,7 @@ up and the image is noisier.
 
 from dataclasses import replace
 from math import ceil, floor, pi
+from threading import Event, Lock
 from typing import Literal
 
 import numpy as np
@@ -373,3 +374,31 @@ def _pixels_moved(
     leds, _ = leds_in_camera(scene.pen, rotations[[0, -1]], translations[[0, -1]])
     first, last = scene.camera.project(leds)
     return float(np.linalg.norm(last - first, axis=-1).max())
+
+
+class SkippingClock:
+    """A clock that advances only by waiting, at once.
+
+    With it a simulated hour takes as long as its images take to make, and the same
+    calls give the same images. If it ``rests``, a wait that can be interrupted takes
+    real time, so that a camera without a reader does not occupy the processor.
+    """
+
+    is_real = False
+
+    def __init__(self, *, rests: bool = False) -> None:
+        self._rests = rests
+        self._now_ns = 0
+        self._lock = Lock()
+
+    def now_ns(self) -> int:
+        """Return the sum of all waits, ns."""
+        return self._now_ns
+
+    def wait(self, seconds: float, wake: Event | None = None) -> bool:
+        """Advance by ``seconds`` unless ``wake`` is set; return whether it is."""
+        if wake is not None and wake.wait(max(seconds, 0.0) if self._rests else 0.0):
+            return True
+        with self._lock:
+            self._now_ns += round(max(seconds, 0.0) * 1e9)
+        return False

@@ -16,7 +16,7 @@ from lightpen.formats.files import mark_simulated, why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_camera, write_rig
 from lightpen.model.ellipse import ellipse_centers
-from lightpen.model.rigid import Rig, fit_rigid, from_first
+from lightpen.model.rigid import Rig, fit_rigid
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
     ScenePlan,
@@ -255,3 +255,11 @@ def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
         }
         for led in range(pen.n_leds)
     ]
+
+
+def from_first(rig: Rig) -> Rig:
+    """Return a rig without covariance, expressed in the frame of its first camera."""
+    rotations = rig.rotations @ rig.rotations[0].T
+    translations = rig.translations - rotations @ rig.translations[0]
+    rotations[0], translations[0] = np.eye(3), 0.0  # exactly, whatever was rounded
+    return replace(rig, rotations=rotations, translations=translations)

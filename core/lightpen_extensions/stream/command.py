@@ -34,9 +34,10 @@ from lightpen.errors import LightpenError, UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.record.calibrations import bending_of, read_calibration, with_status
+from lightpen.record.calibrations import read_calibration, with_status
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.solving import FilesBeside, files_beside
+from lightpen_extensions.measure.probing.current_tip import bending_of
 from lightpen_extensions.measure.probing.sources import (
     instrument_of,
     touch_place,

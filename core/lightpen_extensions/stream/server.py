@@ -21,7 +21,7 @@ from threading import Lock, Thread
 from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.errors import StreamError
+from lightpen.errors import LightpenError
 from lightpen.formats.files import strerror
 from lightpen.messages import Message, message, printable
 from lightpen_extensions.measure.session import SessionSetup, SessionState
@@ -406,3 +406,7 @@ def _why_not(place: StreamPlace, error: OSError) -> Message:
 
 def _not_open(place: StreamPlace, reason: Message | str) -> Message:
     return message("stream.not-open", place=printable(str(place)), reason=reason)
+
+
+class StreamError(LightpenError):
+    """Poses cannot be streamed as requested."""

@@ -11,13 +11,12 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.swing.capture.state import Phase, SwingEventKind, SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_extensions.simulator.camera import GuidedOperator
+from lightpen_extensions.simulator.camera import GuidedOperator, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 
 TIMEOUT = 60.0  # s until a test gives up

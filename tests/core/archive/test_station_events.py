@@ -20,12 +20,10 @@ from lightpen.messages import message
 from lightpen.model.limits import StationLimits
 from lightpen.model.names import Origin
 from lightpen.record.folder import (
-    CONCLUSION,
     VERIFICATIONS,
     CalibratedCamera,
     TrialOutcome,
     keep_camera_calibration,
-    keep_verification,
 )
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.supervision import (
@@ -38,7 +36,9 @@ from lightpen.record.library.supervision import (
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen_extensions.comparisons.assessment import (
+    CONCLUSION,
     VerificationAssessment,
+    keep_verification,
     verification_record,
 )
 from lightpen_extensions.plant.copies import entries_of, records_of

@@ -4,7 +4,8 @@ from threading import Event
 
 import pytest
 
-from lightpen.cameras.pairing import Clock, MachineClock, SkippingClock
+from lightpen.cameras.pairing import Clock, MachineClock
+from lightpen_extensions.simulator.camera import SkippingClock
 
 
 @pytest.fixture(params=[MachineClock, SkippingClock])

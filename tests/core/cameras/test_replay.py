@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import Image
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import (
     DeviceLost,
     DeviceNotFound,
@@ -23,6 +22,7 @@ from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.images import ImageSource
 from lightpen.messages import message
+from lightpen_extensions.simulator.camera import SkippingClock
 
 N_IMAGES = 5
 

@@ -10,7 +10,7 @@ import pytest
 from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
-from lightpen.cameras.pairing import Clock, MachineClock, SkippingClock
+from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
@@ -40,6 +40,7 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import CameraWorker, is_too_slow
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 

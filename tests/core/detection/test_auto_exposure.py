@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Frame, Range
 from lightpen.detection.inspection import (
     LONGEST_EXPOSURE_US,
@@ -17,7 +16,7 @@ from lightpen.detection.inspection import (
     inspect,
 )
 from lightpen.detection.pen_detection import detect_pen
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 

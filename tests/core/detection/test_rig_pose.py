@@ -8,8 +8,10 @@ from tests.accepted_tip import Hold, Holder, seen_by
 from lightpen.detection.pen_detection import unseen
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.rig_observations import fit_rig_poses, see_together
-from lightpen.model.rigid import from_first, rig_of
+from lightpen.detection.rig_observations import fit_rig_poses
+from lightpen.model.rigid import rig_of
+from lightpen_extensions.measure.probing.instruments import see_together
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 

@@ -32,7 +32,8 @@ from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import Rig, from_first, rotation_from_vector
+from lightpen.model.rigid import Rig, rotation_from_vector
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,

@@ -13,7 +13,7 @@ import yaml
 
 from lightpen.errors import FileError
 from lightpen.formats.rig_files import RigFile, read_rig, write_camera, write_rig
-from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 
 RIG = from_first(row_of_cameras(3, 900.0))

@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     Connection,
@@ -30,6 +29,7 @@ from lightpen.live.pipeline import UNHURRIED, ImageListener, Live, LiveImage
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase, SwingEventKind
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 

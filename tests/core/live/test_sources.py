@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import MachineClock, SkippingClock
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.live.sources import SourceEnvironment, cameras_of
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.preparation import SourceChoice, SourceKind
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene, beside
 from lightpen_extensions.simulator.simulator import SceneSimulator
 

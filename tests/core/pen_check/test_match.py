@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.messages import message
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.pen_check.match import MAX_VIEWS, Finding, PenMatch, add_view, match_pen
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,

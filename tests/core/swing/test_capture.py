@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.reasons import Reason
@@ -31,7 +30,7 @@ from lightpen.swing.capture.state import (
     start_swing,
 )
 from lightpen.swing.swing_recorder import capture_image, resume_swing
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 

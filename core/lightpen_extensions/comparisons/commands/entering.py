@@ -8,8 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from lightpen.commands.arguments import above_zero, not_negative, number_from
-from lightpen.commands.console import shown, write_record
+from lightpen.commands.console import (
+    DONE,
+    NOT_THE_TIP,
+    TO_CHECK,
+    TO_REPEAT,
+    shown,
+    write_record,
+)
 from lightpen.errors import UsageError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import (
@@ -20,11 +28,11 @@ from lightpen.model.limits import (
 )
 from lightpen.model.names import Origin
 from lightpen.record.calibrations import CalibrationFile
-from lightpen.record.folder import attributed, keep_verification
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.result_folder import FolderArchive, data_folder_of
 from lightpen.record.swings.header import Names
+from lightpen_extensions.comparisons.assessment import attributed, keep_verification
 
 RULE_WORDS = {
     "simple": DecisionRule.SIMPLE,
@@ -204,3 +212,18 @@ def _print_overdue(data: Path, names: Names) -> None:
     overdue = found.overdue(names.pen, names.tip)
     if overdue is not None:
         print(shown(str(overdue)))
+
+
+STATUSES = {
+    Grade.REPEAT: TO_REPEAT,
+    Grade.CHECK: TO_CHECK,
+    Grade.SCALE: NOT_THE_TIP,
+    Grade.STEADY: NOT_THE_TIP,
+}
+
+
+def verdict_status(options: argparse.Namespace, grade: Grade | None) -> int:
+    """Return the exit status of a verdict, if it is requested."""
+    if grade is None or not options.exit_by_verdict:
+        return DONE
+    return STATUSES.get(grade, DONE)

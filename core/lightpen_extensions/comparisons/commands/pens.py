@@ -7,17 +7,13 @@ from typing import Any
 import numpy as np
 
 from lightpen.commands.arguments import (
-    add_camera_and_pen,
+    add_camera,
     add_file,
     add_json,
+    add_pen_options,
     supervisor_signature,
 )
-from lightpen.commands.console import (
-    printing,
-    require_other_file,
-    shown,
-    verdict_status,
-)
+from lightpen.commands.console import printing, require_other_file, shown
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
@@ -27,7 +23,7 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile, keep_bending, read_calibration
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.record.library.library_changes import Author
 from lightpen.record.recomputing import recompute, recorded_camera_and_pen
 from lightpen.record.results.result_folder import data_folder_of
@@ -42,6 +38,7 @@ from lightpen_extensions.comparisons.commands.entering import (
     add_entering,
     add_exit_by_verdict,
     keep_record,
+    verdict_status,
 )
 from lightpen_extensions.comparisons.pen_health import (
     GROWN,
@@ -51,7 +48,12 @@ from lightpen_extensions.comparisons.pen_health import (
     examine_pen,
     require_one_pen,
 )
-from lightpen_extensions.comparisons.press_test import PRESS_TEST, PressTest, press_test
+from lightpen_extensions.comparisons.press_test import (
+    PRESS_TEST,
+    PressTest,
+    keep_bending,
+    press_test,
+)
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
@@ -233,3 +235,22 @@ def press_test_text(found: PressTest) -> str:
     return "\n".join(
         [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
     )
+
+
+def add_camera_and_pen(
+    parser: argparse.ArgumentParser,
+    *,
+    states_pen: bool = True,
+    is_required: bool = True,
+) -> None:
+    """Add ``--camera`` and ``--pen``, and the options of the pen."""
+    add_camera(parser, "intrinsics file of the camera", is_required=is_required)
+    parser.add_argument(
+        "--pen",
+        type=Path,
+        required=is_required,
+        metavar="FILE",
+        help="LED file of the pen",
+    )
+    if states_pen:
+        add_pen_options(parser)

@@ -8,24 +8,23 @@ import numpy as np
 
 from lightpen.archive.trends import TipEstimate
 from lightpen.commands.arguments import above_zero, add_json
-from lightpen.commands.console import (
-    printing,
-    require_other_file,
-    shown,
-    verdict_status,
-)
+from lightpen.commands.console import printing, require_other_file, shown
 from lightpen.errors import UsageError
 from lightpen.formats.opened_files import all_hashed
 from lightpen.formats.own_json import file_entry
 from lightpen.messages import printable
-from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.model.limits import VerificationLimits
 from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen_extensions.comparisons.assessment import verification_record
+from lightpen_extensions.comparisons.assessment import (
+    rule_in_words,
+    verification_record,
+)
 from lightpen_extensions.comparisons.commands.entering import (
     add_entering,
     add_verdict,
     keep_record,
     limits_in_force,
+    verdict_status,
 )
 from lightpen_extensions.comparisons.pen_health import require_one_pen
 from lightpen_extensions.comparisons.repeatability import (

@@ -13,7 +13,6 @@ from lightpen.commands.console import (
     printing,
     require_other_file,
     shown,
-    verdict_status,
     write_record,
 )
 from lightpen.errors import FileError, UsageError
@@ -22,13 +21,13 @@ from lightpen.formats.files import FileFormat, write_whole
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import REFERENCE, Artefact, ArtefactKind, Side
 from lightpen.model.coverage import COVERAGE_FACTOR
-from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
 from lightpen_extensions.comparisons.assessment import (
     COLUMN,
     VERIFY_AGAIN,
     VerificationAssessment,
     check,
+    rule_in_words,
     verdict_lines,
 )
 from lightpen_extensions.comparisons.commands.entering import (
@@ -37,6 +36,7 @@ from lightpen_extensions.comparisons.commands.entering import (
     add_limits,
     add_verdict,
     keep_record,
+    verdict_status,
 )
 from lightpen_extensions.comparisons.commands.pens import (
     add_verify_pen,

@@ -21,14 +21,15 @@ from lightpen.messages import Message
 from lightpen.model.limits import BALL_UNCERTAINTY
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
-from lightpen.record.folder import conditions_entries
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen_extensions.comparisons.assessment import (
     VerificationAssessment,
+    conditions_entries,
     read_drift,
     verification_record,
 )
 from lightpen_extensions.comparisons.commands.entering import limits_in_force
+from lightpen_extensions.measure.probing.current_tip import bending_of
 from lightpen_extensions.measure.probing.probing import (
     FAST,
     ONE_IMAGE,

@@ -1,6 +1,7 @@
 """The current tip of a station, and the instrument that it makes with its files."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -9,10 +10,13 @@ from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.opened_files import InputFile, hashed
+from lightpen.local_time import local_now
 from lightpen.messages import printable
+from lightpen.model.bending import ASSUMED_BENDING, Bending
 from lightpen.model.names import Origin
-from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
-from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.library.tip_library import read_library
+from lightpen.record.results.result_folder import FolderArchive, data_folder_of
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.probing.sources import (
@@ -111,3 +115,15 @@ def _viewers(preparation: Preparation) -> PenCameras | None:
     if camera_file is None:
         return None
     return viewers_of_camera(camera_file.camera, camera_file.path)
+
+
+def bending_of(calibration: CalibrationFile, data: Path | None = None) -> Bending:
+    """Return the bending of a tip today.
+
+    By the library of a data folder, by default that of the result. The library knows
+    no simulated tip.
+    """
+    data = data or data_folder_of(calibration.path)
+    if data is None or calibration.origin is Origin.SIMULATED:
+        return ASSUMED_BENDING
+    return read_library(data).bending_of(calibration.names.tip, local_now().date())

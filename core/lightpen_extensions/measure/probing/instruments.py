@@ -10,6 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.reasons import Reason
+from lightpen.detection.rig_observations import fit_rig_poses
 from lightpen.estimation.bundle.priors import (
     Prior,
     Priors,
@@ -157,3 +160,42 @@ def scale_direction(instrument: Instrument) -> FloatArray:
     by_scale = np.zeros(at.number)
     by_scale[at.leds] = (instrument.pen.leds - instrument.tip_pen).ravel()
     return by_scale
+
+
+def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
+    """Return the detection of a moment with one pose rig_from_pen by all cameras.
+
+    A camera without a pose, or with a blurred image, is ignored; if none is left, the
+    detection is returned as it is.
+    """
+    views = (detection, *detection.others)
+    if len(views) == 1:
+        return detection
+    fit = [view.has_pose and not view.is_blurred for view in views]
+    if not any(fit):
+        return detection
+    nowhere = np.full_like(detection.pixels, np.nan)
+    clean = [
+        view if is_fit else replace(view, pixels=nowhere)
+        for view, is_fit in zip(views, fit, strict=True)
+    ]
+    start = fit.index(True)
+    back = rig.rotations[start].T
+    poses = fit_rig_poses(
+        rig,
+        pen,
+        np.stack([view.pixels for view in clean])[None],
+        (back @ views[start].rotation)[None],
+        (back @ (views[start].translation - rig.translations[start]))[None],
+    )
+    return replace(
+        clean[0],
+        reason=Reason.NONE,
+        rotation=poses.rotations[0],
+        translation=poses.translations[0],
+        cofactors=poses.covariances[0] / poses.sigma**2,
+        sigma=poses.sigma,
+        spots=views[start].spots,
+        labels=views[start].labels,
+        others=tuple(clean[1:]),
+    )

@@ -11,7 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import counted
-from lightpen.detection.rig_observations import observe_rig_images, see_together
+from lightpen.detection.rig_observations import observe_rig_images
 from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.calibration_record import InstrumentRecord
@@ -41,6 +41,7 @@ from lightpen.record.swings.solving import RecordSource, is_simulated_recording,
 from lightpen_extensions.measure.probing.instruments import (
     in_use,
     instrument_of_files,
+    see_together,
     with_rig,
 )
 from lightpen_extensions.measure.probing.probing import (

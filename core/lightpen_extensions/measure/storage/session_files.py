@@ -23,13 +23,7 @@ from lightpen.formats.files import unreadable
 from lightpen.formats.opened_files import InputFile, all_hashed, hashed
 from lightpen.formats.own_json import file_entry, plain, record_heading
 from lightpen.model.names import Origin
-from lightpen.record.folder import (
-    CONCLUSION,
-    TrialOutcome,
-    conditions_entries,
-    keep_verification,
-    verifications_folder,
-)
+from lightpen.record.folder import TrialOutcome
 from lightpen.record.library.signing import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
@@ -40,8 +34,12 @@ from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen_extensions.comparisons.assessment import (
+    CONCLUSION,
     VerificationAssessment,
+    conditions_entries,
+    keep_verification,
     verification_record,
+    verifications_folder,
 )
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.sources import PenCameras

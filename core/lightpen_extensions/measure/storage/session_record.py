@@ -21,7 +21,6 @@ from msgspec import Struct, to_builtins
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.rig_observations import see_together
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.files import (
     LARGEST_RECORD,
@@ -44,17 +43,19 @@ from lightpen.formats.own_json import (
 from lightpen.formats.part_files import sweep_parts
 from lightpen.messages import Message, message, printable
 from lightpen.model.names import Origin
-from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.folder import TOUCHES, VERIFICATIONS
 from lightpen.record.library.entered_files import numbered_files
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.header import Header, Names
 from lightpen.record.swings.reading import JOURNAL, open_record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView, is_locked
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.comparisons.assessment import CONCLUSION
 from lightpen_extensions.measure.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
 )
+from lightpen_extensions.measure.probing.instruments import see_together
 from lightpen_extensions.measure.probing.probing import ProbingPhase, approach_of
 from lightpen_extensions.measure.probing.sources import held_in, point_image_name
 from lightpen_extensions.measure.session import (

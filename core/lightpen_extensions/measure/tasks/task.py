@@ -16,9 +16,12 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import Decision
-from lightpen.model.limits import BALL_UNCERTAINTY, VerificationLimits, rule_in_words
+from lightpen.model.limits import BALL_UNCERTAINTY, VerificationLimits
 from lightpen.record.folder import MEASURED_PART
-from lightpen_extensions.comparisons.assessment import VerificationAssessment
+from lightpen_extensions.comparisons.assessment import (
+    VerificationAssessment,
+    rule_in_words,
+)
 from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
 from lightpen_extensions.measure.measuring.report import ResultTable
 from lightpen_extensions.measure.tasks.probed_point import NO_DRIFT, ProbedPoint

@@ -35,7 +35,6 @@ from lightpen.archive.store import Database
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.names import Origin
-from lightpen.record.folder import keep_verification
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature, save_limits
@@ -72,6 +71,7 @@ from lightpen_extensions.comparisons.assessment import (
     USE_TIP,
     VERIFY_AGAIN,
     VerificationAssessment,
+    keep_verification,
     verification_record,
 )
 from lightpen_extensions.plant.server import Replicator

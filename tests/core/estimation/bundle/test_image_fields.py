@@ -20,7 +20,7 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.model.camera import Camera
 from lightpen.model.fisheye import LensField
 from lightpen.model.limits import USUAL
-from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,

@@ -15,7 +15,7 @@ from lightpen.estimation.bundle.noise_correlation import (
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.model.limits import USUAL
-from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, seen_from, swing_poses
 

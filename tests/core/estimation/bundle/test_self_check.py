@@ -15,7 +15,8 @@ from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.model.limits import SwingLimits
-from lightpen.model.rigid import from_first, nearest_rotation, vector_from_rotation
+from lightpen.model.rigid import nearest_rotation, vector_from_rotation
+from lightpen_extensions.simulator.scene_files import from_first
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,

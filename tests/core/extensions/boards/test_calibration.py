@@ -10,13 +10,16 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.model.camera import Camera
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.calibration import (
     MIN_VIEWS,
     CameraCalibration,
     calibrate_camera,
 )
-from lightpen_extensions.boards.distortion import choose_distortion, fit_camera
+from lightpen_extensions.boards.distortion import (
+    choose_distortion,
+    fit_camera,
+    map_uncertainty,
+)
 from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.report import residuals_by_region
 from lightpen_extensions.boards.start import start_camera

@@ -9,9 +9,9 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
+from lightpen_extensions.boards.distortion import map_uncertainty
 from lightpen_extensions.boards.observing import (
     STILL_TIME,
     BoardVisibility,

@@ -13,7 +13,6 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector, skew
-from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import CameraCalibration, calibrate_camera
 from lightpen_extensions.boards.distortion import (
@@ -22,6 +21,7 @@ from lightpen_extensions.boards.distortion import (
     MANY,
     choose_distortion,
     fit_camera,
+    map_uncertainty,
 )
 from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import start_any_camera

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import MachineClock, SkippingClock
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     ConfigError,
@@ -31,7 +31,7 @@ from lightpen.cameras.sources import source_named
 from lightpen.cameras.worker import CameraWorker
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
 
 SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)

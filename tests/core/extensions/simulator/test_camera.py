@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pose import fit_poses
@@ -13,7 +12,7 @@ from lightpen.model.camera import Camera
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.simulated_boards import HELD_IMAGES, HELD_S, HeldBoard
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP

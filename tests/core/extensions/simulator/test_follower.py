@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from typing_extensions import override
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 from lightpen.model.rigid import FIRST_LEAN, UPRIGHT, Posture
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
-from lightpen_extensions.simulator.camera import GENTLE_LEANS, GuidedOperator
+from lightpen_extensions.simulator.camera import (
+    GENTLE_LEANS,
+    GuidedOperator,
+    SkippingClock,
+)
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.pairing import SkippingClock
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import (
     AWAY,
     GUIDED,

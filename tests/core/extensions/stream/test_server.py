@@ -19,7 +19,6 @@ from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
-from lightpen.errors import StreamError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.own_json import record_bytes
 from lightpen.model.names import Origin
@@ -45,6 +44,7 @@ from lightpen_extensions.stream.server import (
     MOST_CLIENTS,
     NamedPoint,
     PoseStream,
+    StreamError,
     StreamPlace,
     StreamStatus,
 )

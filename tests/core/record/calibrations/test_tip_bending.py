@@ -11,15 +11,12 @@ from lightpen.formats.own_json import record_bytes
 from lightpen.local_time import local_now
 from lightpen.model.bending import ASSUMED_BENDING, measured_on
 from lightpen.model.names import Origin
-from lightpen.record.calibrations import (
-    CalibrationFile,
-    bending_of,
-    keep_bending,
-    read_calibration,
-)
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip, item_entries, read_library
 from lightpen.record.swings.header import Names
+from lightpen_extensions.comparisons.press_test import keep_bending
+from lightpen_extensions.measure.probing.current_tip import bending_of
 
 NOW = datetime(2025, 11, 3, 12, tzinfo=UTC)
 TODAY = local_now().date()

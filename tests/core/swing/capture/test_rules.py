@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
 from lightpen.messages import (
@@ -46,6 +45,7 @@ from lightpen.swing.capture.state import (
     Transition,
     start_swing,
 )
+from lightpen_extensions.simulator.camera import SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,

@@ -8,10 +8,11 @@ from lightpen.archive.trends import ControlLimits, TipEstimate
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
-from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.comparisons.assessment import (
     VERIFY_AGAIN,
     check,
+    rule_in_words,
     verification_record,
 )
 from lightpen_extensions.comparisons.commands.pens import (

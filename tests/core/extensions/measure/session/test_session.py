@@ -8,7 +8,6 @@ import pytest
 from tests.accepted_tip import Hold, Holder, leant
 from tests.verifying import BAR, CHOICES, LENGTH, found_by
 
-from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.estimation.reports.verdict import Grade
@@ -32,7 +31,7 @@ from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART, sizes_of
 from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
 from lightpen_extensions.measure.tasks.task import Conditions
-from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 
