@@ -8,8 +8,6 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from lightpen.formats.machine_settings import machine_file
-
 Run = Callable[..., CompletedProcess[str]]
 
 
@@ -56,25 +54,3 @@ def test_a_certificate_names_who_calibrated(
     assert not out.exists()
     assert lightpen(*words, *where, "DE").returncode == 0
     assert "<dcc:city>Berlin</dcc:city>" in out.read_text("utf-8")
-
-
-def test_a_certificate_names_the_laboratory_of_the_computer(
-    lightpen: Run, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
-    file = machine_file()
-    if not file.is_relative_to(tmp_path):
-        pytest.skip("This system has one folder for the settings of all users.")
-    file.parent.mkdir(parents=True)
-    own = {"name": "Works 2", "email": "w2@example.com", "city": "Bonn"}
-    own |= {"country": "DE", "procedure": "WI-0815"}
-    file.write_text(json.dumps({"laboratory": own}))
-    out = tmp_path / "tip.xml"
-    words = ("export", record, out, "--for", "dcc")
-
-    assert lightpen(*words, "--procedure", "WI-0816").returncode == 0
-    text = out.read_text("utf-8")
-    assert "<dcc:city>Bonn</dcc:city>" in text
-    assert "WI-0816" in text
-    other = lightpen(*words, "--laboratory", "Hall 3")  # of which nothing is known
-    assert "--email, --city, --country are missing" in other.stderr

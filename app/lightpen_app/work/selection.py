@@ -67,8 +67,7 @@ class Selection(QObject):
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        limits = settings.machine_limits()
-        self._preparation = Preparation(source=NO_SOURCE, limits=limits.swing)
+        self._preparation = Preparation(source=NO_SOURCE)
         self._extensions: dict[str, dict[str, Any]] = {}
         self._supervision = Supervision()
         self._unread = FilePaths()
@@ -154,7 +153,7 @@ class Selection(QObject):
         self._follow(before)
 
     def _limits_for(self, preparation: Preparation) -> StationLimits:
-        chosen = replace(self._settings.machine_limits(), swing=preparation.limits)
+        chosen = StationLimits(swing=preparation.limits)
         return self._supervision.limits_at(preparation.names.station, chosen)
 
     def _follow(self, before: Preparation) -> None:

@@ -23,7 +23,7 @@ from lightpen.cameras.sources import source_named
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
-from lightpen.model.limits import USUAL, Assumptions, StationLimits, SwingLimits
+from lightpen.model.limits import USUAL, Assumptions, SwingLimits
 from lightpen.model.names import Laboratory, Method
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import (
@@ -34,14 +34,7 @@ from lightpen.swing.preparation import (
 )
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
-from lightpen_app.work.settings_store import (
-    Changes,
-    Content,
-    load,
-    load_of_machine,
-    save,
-    with_changes,
-)
+from lightpen_app.work.settings_store import Changes, Content, load, save, with_changes
 from lightpen_resources import SOURCE_LANGUAGE, languages
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -200,8 +193,7 @@ class Settings(QObject):
         self.file = file
         loaded = load(file)
         self._content: Content = loaded.content
-        self._machine, fault = load_of_machine()
-        self.fault = loaded.fault or fault
+        self.fault = loaded.fault
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
         self._why_unwritten: Message | None = None
@@ -212,10 +204,8 @@ class Settings(QObject):
         self._written.connect(self._on_written, Qt.ConnectionType.QueuedConnection)
 
     def preferences(self) -> Preferences:
-        """Return the preferences; at first in the computer's or system's language."""
-        named = self._machine.language
-        language = named if named in languages() else system_language()
-        usual = Preferences(language=language)
+        """Return the preferences; at first in the system's language."""
+        usual = Preferences(language=system_language())
         read = read_group(self._content.get("preferences", {}), usual)
         known = read.language if read.language in languages() else usual.language
         return replace(read, language=known)
@@ -230,9 +220,7 @@ class Settings(QObject):
 
     def station(self, name: str) -> Station:
         """Return the last selection at a station; defaults for a new one."""
-        limits = self.machine_limits()
-        usual = Station(limits=limits.swing)
-        return read_group(self._content.get("stations", {}).get(name), usual)
+        return read_group(self._content.get("stations", {}).get(name), Station())
 
     def set_station(self, name: str, station: Station) -> None:
         """Store the selection at a station."""
@@ -278,17 +266,12 @@ class Settings(QObject):
         self._save("extensions", {key: stored_group(value)})
 
     def last(self) -> LastChoices:
-        """Return the last choices; the laboratory is at first that of the machine."""
-        usual = LastChoices(laboratory=self._machine.laboratory)
-        return read_group(self._content.get("last"), usual)
+        """Return the last choices."""
+        return read_group(self._content.get("last"), LastChoices())
 
     def set_last(self, **choices: object) -> None:
         """Remember choices by the names of `LastChoices`."""
         self._save("last", stored_group(choices))
-
-    def machine_limits(self) -> StationLimits:
-        """Return the limits of this computer, which a station uses at first."""
-        return self._machine.station_limits()
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Restore the geometry of a window; False if never stored."""

@@ -19,7 +19,6 @@ from lightpen.formats.files import (
     sync_folder,
     write_whole,
 )
-from lightpen.formats.machine_settings import MachineSettings, machine_settings
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.part_files import folder_locked, sweep_parts
 from lightpen.messages import Message, message, printable
@@ -51,14 +50,6 @@ def load(file: Path) -> LoadedSettings:
         return LoadedSettings({}, _set_aside(file))
     except FileError as error:
         return LoadedSettings({}, error.message)
-
-
-def load_of_machine() -> tuple[MachineSettings, Message | None]:
-    """Return the settings for all users, and why they are left out if wrong."""
-    try:
-        return machine_settings(), None
-    except FileError as error:
-        return MachineSettings(), error.message
 
 
 def with_changes(content: Content, changes: Changes) -> Content:

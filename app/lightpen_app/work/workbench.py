@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import Message
+from lightpen.model.limits import DueRule
 from lightpen.record.folder import check_writable, sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
@@ -146,9 +147,8 @@ class Workbench(QObject):
         self.run = SwingRun(folder, around.now, notices, self)
         self.parts: list[WorkbenchPart] = []  # of extensions, which add them
         self.live = LiveView(self.run, notices, self)
-        rule = settings.machine_limits().due
         self.library = LibraryWatch(
-            folder, self.run.logbook, rule, around.now, notices, self
+            folder, self.run.logbook, DueRule(), around.now, notices, self
         )
         self.pens = PenFiles(
             self.selection, self.library, notices, folder, around.now, self

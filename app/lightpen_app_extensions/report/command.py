@@ -58,7 +58,7 @@ def write_report(result: Path, out: Path | None, language: str) -> Path:
     from lightpen_app_extensions.report.content import print_report_of, read_content
     from lightpen_app_extensions.report.pages import pdf_of
 
-    # The laboratory was named in the window, or is that of this computer.
+    # The laboratory was named in the window.
     content = read_content(result, Settings(settings_file()).last().laboratory)
     if not has_display():
         os.environ["QT_QPA_PLATFORM"] = "offscreen"

@@ -121,8 +121,6 @@ MESSAGES = {
     "entered.changed": "The file {file} was changed after it was entered in the archive as entry {number}. Nothing is accepted until it is restored from a copy.",
     "entered.changed-before": "The file {file} was changed before it was entered in the archive. Nothing is accepted until it is restored from a copy.",
     "file.settings": "settings file",
-    "file.machine-settings": "file of settings for all users",
-    "machine-settings.wrong": "The settings for all users in {file} are wrong and were left out: {why}. Ask the administrator to correct the file.",
     "settings.damaged": "The settings {file} are damaged and were renamed to {aside}. Restore them from a copy, or enter the settings again.",
     "settings.held": "Settings saved, but another program had locked {file} for {seconds:g} s. End that program if it hangs; it may overwrite the settings.",
     "settings.unwritable": "Settings not saved: {file} cannot be written ({reason}). Check free space and write permission of its folder.",

@@ -8,7 +8,6 @@ from lightpen.archive.logbook import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import write_whole
-from lightpen.formats.machine_settings import machine_settings
 from lightpen.local_time import local_now
 from lightpen.messages import printable
 from lightpen.model.names import PLACES, Laboratory, is_country
@@ -59,21 +58,17 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     )
     for name, help_text in (LABORATORY | MORE_OF_IT).items():
         parser.add_argument(
-            f"--{name}",
-            default="",
-            metavar="TEXT",
-            help=f"for dcc: {help_text} (default: of the settings of this computer)",
+            f"--{name}", default="", metavar="TEXT", help=f"for dcc: {help_text}"
         )
 
 
 def _laboratory(options: argparse.Namespace) -> Laboratory:
-    """Return the laboratory of options or computer; refuse one with gaps."""
-    own = None if options.laboratory.strip() else machine_settings().laboratory
+    """Return the laboratory of the options; refuse one with gaps."""
     names = [item.name for item in fields(Laboratory)]
     given = {name: getattr(options, name, "").strip() for name in names}
     given["name"] = options.laboratory.strip()
     chosen = {name: text for name, text in given.items() if text}
-    laboratory = replace(own or Laboratory(), **chosen)
+    laboratory = replace(Laboratory(), **chosen)
     missing = [
         f"--{option}"
         for option, name in zip(LABORATORY, names, strict=False)

@@ -34,7 +34,6 @@ from lightpen.archive.store import (
 )
 from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.formats.files import create_whole
-from lightpen.formats.machine_settings import machine_settings
 from lightpen.messages import Message, message, printable
 from lightpen.record.library.entered_files import make_folder
 from lightpen_extensions.plant.copies import (
@@ -461,5 +460,5 @@ SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
 
 
 def server_address() -> str:
-    """Return the server address by environment variable or machine settings."""
-    return os.environ.get(SERVER, "") or machine_settings().archive_server
+    """Return the server address, by environment variable."""
+    return os.environ.get(SERVER, "")

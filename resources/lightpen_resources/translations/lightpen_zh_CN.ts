@@ -7676,10 +7676,6 @@
         <translation>服务器 {name} 没有本工位的记录。请检查地址和用户。</translation>
     </message>
     <message>
-        <source>The settings for all users in {file} are wrong and were left out: {why}. Ask the administrator to correct the file.</source>
-        <translation>{file} 中所有用户的设置有误，未采用：{why}。请管理员更正此文件。</translation>
-    </message>
-    <message>
         <source>The settings {file} are damaged and were renamed to {aside}. Restore them from a copy, or enter the settings again.</source>
         <translation>设置文件 {file} 已损坏，已改名为 {aside}。请用备份恢复，或重新输入设置。</translation>
     </message>
@@ -8074,10 +8070,6 @@
     <message>
         <source>file of an unfinished verification</source>
         <translation>未完成验证的文件</translation>
-    </message>
-    <message>
-        <source>file of settings for all users</source>
-        <translation>所有用户的设置文件</translation>
     </message>
     <message>
         <source>flatness</source>

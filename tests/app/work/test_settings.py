@@ -12,11 +12,8 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
-from lightpen.formats.machine_settings import machine_file
-from lightpen.model.names import Laboratory
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
-from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings import (
     Preferences,
@@ -71,51 +68,6 @@ def write(file: Path, content: object) -> None:
 def reopened(settings: Settings) -> Settings:
     assert settings.await_saved(TIMEOUT)
     return Settings(settings.file)
-
-
-def test_what_the_administrator_set_is_below_what_the_user_chose(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
-    machine = machine_file()
-    if not machine.is_relative_to(tmp_path):
-        pytest.skip("This system has one folder for the settings of all users.")
-    limits = {"max_uncertainty_mm": 0.02, "max_tip_mm": 0.05, "due_max_days": 14}
-    works = {"name": "Works 2", "procedure": "WI-0815"}
-    write(machine, {"language": "zh_CN", "limits": limits, "laboratory": works})
-    before = machine.read_bytes()
-    settings = Settings(tmp_path / "own" / "lightpen.json")
-
-    assert settings.preferences().language == "zh_CN"
-    assert settings.station("new").limits.max_uncertainty == 0.02
-    assert settings.machine_limits().verification.tip == 0.05
-    assert settings.machine_limits().due.max_days == 14
-    assert settings.last().laboratory == Laboratory(name="Works 2", procedure="WI-0815")
-
-    own = Laboratory(name="Hall 3", procedure="WI-1")
-    settings.set_last(laboratory=own)
-    settings.set_preferences(replace(settings.preferences(), language="en"))
-    settings.set_station("new", STATION)
-    assert reopened(settings).preferences().language == "en"
-    assert reopened(settings).station("new") == STATION
-    assert reopened(settings).last().laboratory == own
-    assert machine.read_bytes() == before
-
-
-def test_wrong_settings_of_the_administrator_are_reported_and_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
-    machine = machine_file()
-    if not machine.is_relative_to(tmp_path):
-        pytest.skip("This system has one folder for the settings of all users.")
-    write(machine, {"langauge": "zh_CN"})
-
-    settings = Settings(tmp_path / "own" / "lightpen.json")
-
-    assert settings.fault is not None
-    assert "'langauge' is none of" in settings.fault.text()
-    assert settings.preferences() == Preferences(language=system_language())
 
 
 @pytest.mark.parametrize(
