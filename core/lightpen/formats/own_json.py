@@ -82,10 +82,10 @@ def in_shape(tree: Any, shape: type[T]) -> T:
         raise DamagedError(str(error)) from error
 
 
-def _path(kind: type, value: Any) -> Path:
-    """Return a path in the field of a type, which `msgspec` does not know."""
-    if kind is not Path or not isinstance(value, str):
-        raise ValueError(f"{value} is no path.")
+def _path(kind: type, value: Any) -> object:
+    """Return the value of a type that `msgspec` does not know; `Path` is one."""
+    if kind is not Path:
+        return value
     require_path(value)
     return Path(value)
 
