@@ -351,13 +351,13 @@ def scene(
 ) -> Callable[..., Path]:
     """Return a function that simulates a set with `options`, each set once.
 
-    After ``hard`` they are the number of images, the seed, binning and pen.
+    After ``hard`` or ``clean`` they are number of images, seed, binning and pen.
     """
 
     def simulated(*options: str) -> Path:
         def simulate(folder: Path) -> None:
-            if options[0] == "hard":
-                _write_hard(folder / "set", *options[1:])
+            if options[0] in ("hard", "clean"):
+                _write_set(folder / "set", *options)
                 return
             outcome = lightpen("simulate", folder / "set", *options)
             assert outcome.returncode == 0, outcome.stderr
@@ -367,15 +367,18 @@ def scene(
     return simulated
 
 
-def _write_hard(folder: Path, n_images: str, seed: str, binning: str, pen: str) -> None:
-    from tests.simulated_disturbances import write_disturbed
+def _write_set(
+    folder: Path, kind: str, n_images: str, seed: str, binning: str, pen: str
+) -> None:
+    from tests.simulated_disturbances import HARD, Disturbances, write_disturbed
+    from tests.simulated_pens import SAMPLE_PENS
 
-    from lightpen_extensions.simulator.scenes import SAMPLE_PENS, Scene
+    from lightpen_extensions.simulator.scenes import Scene
     from lightpen_extensions.simulator.swings import paper_camera
 
     camera = paper_camera(int(binning))
     scene = Scene(int(n_images), int(seed), pen=SAMPLE_PENS[pen](), camera=camera)
-    write_disturbed(scene, folder)
+    write_disturbed(scene, folder, HARD if kind == "hard" else Disturbances())
 
 
 @pytest.fixture(scope="session")

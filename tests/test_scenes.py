@@ -249,7 +249,7 @@ def test_one_image_again_and_again_is_refused(
 def test_another_layout_gives_its_tip_or_is_refused(
     pen: str, seed: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", seed)
+    folder = scene("clean", "24", seed, "2", pen)
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
@@ -293,6 +293,6 @@ def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> No
 def test_the_file_of_another_pen_is_refused_for_independent_images(
     pen: str, scene: Scene, lightpen: Run, shared_data: Path, tmp_path: Path
 ) -> None:
-    other = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", "1")
+    other = scene("clean", "24", "1", "2", pen)
     clean = shared_data / "swing-clean"
     assert_pen_refused(lightpen, clean, other / "leds.csv", tmp_path / "some")

@@ -10,7 +10,7 @@ from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plots import Curve
-from lightpen_app.widgets.result_plots import ArrowPlot, BarPlot, BudgetPlot, MarkPlot
+from lightpen_app.widgets.result_plots import ArrowPlot, BudgetPlot, MarkPlot
 
 translate = QCoreApplication.translate
 
@@ -19,11 +19,7 @@ HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at th
 
 def charts_of(calibration: CalibrationRecord) -> dict[str, Figure]:
     """Return the plots by their names in the template."""
-    return {
-        "budget_plot": _budget(calibration),
-        "misfits": _misfits(calibration),
-        "led_plot": _leds(calibration),
-    }
+    return {"budget_plot": _budget(calibration), "misfits": _misfits(calibration)}
 
 
 def _misfits(calibration: CalibrationRecord) -> Figure:
@@ -42,21 +38,6 @@ def _misfits(calibration: CalibrationRecord) -> Figure:
     )
     parts = (np.where(part, heights, np.nan) for part in (used, ~used))
     plot.set_data(np.arange(1.0, len(misfits) + 1), *parts)
-    return plot
-
-
-def _leds(calibration: CalibrationRecord) -> Figure:
-    """Return the residuals of each LED."""
-    rms = np.array([led.rms_px for led in calibration.leds], dtype=np.float64)
-    means = np.array([led.mean_px for led in calibration.leds], dtype=np.float64)
-    names = (
-        translate("paper", "rms"),
-        translate("paper", "mean x"),
-        translate("paper", "mean y"),
-    )
-    axes = Axes(translate("paper", "Residuals by LED / px"), translate("paper", "LED"))
-    plot = BarPlot(axes, [Curve(name, name) for name in names], "led")
-    plot.set_data([str(led.led) for led in calibration.leds], rms, *means.T)
     return plot
 
 

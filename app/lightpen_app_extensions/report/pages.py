@@ -23,7 +23,6 @@ from PySide6.QtCore import (
 from PySide6.QtGui import (
     QAbstractTextDocumentLayout,
     QColor,
-    QFontMetricsF,
     QPagedPaintDevice,
     QPageLayout,
     QPageSize,
@@ -49,8 +48,8 @@ from lightpen_app_extensions.report.template import (
     Drawn,
     Piece,
     PrintSize,
+    markup,
     print_font,
-    printed_text,
 )
 
 translate = QCoreApplication.translate
@@ -61,7 +60,7 @@ LEFT_MARGIN = (PAGE_WIDTH - WIDTH) / 2
 TOP, BOTTOM = 30 * MM, 22 * MM  # from the edges of the paper to what is on a page
 ROOM = PAGE_HEIGHT - TOP - BOTTOM
 HEADER, FOOTER = 11 * MM, 18 * MM  # from the upper and the lower edge
-BADGE_PADDING = 40.0
+LINE = 155.0  # between the lines of the header
 KEEP, WITH = "keep", "with"  # first of what stands on one page, and the others
 
 
@@ -121,11 +120,7 @@ def lay_out(parts: Sequence[Piece]) -> QTextDocument:
 
     Parts that belong together begin on a new page if they do not fit as a whole.
     """
-    document = QTextDocument()
-    document.setUseDesignMetrics(True)
-    document.setDocumentMargin(0)
-    document.setDefaultFont(print_font(PrintSize.BODY))
-    document.setDefaultStyleSheet(_style_sheet())
+    document = _document()
     _Plots(document, {n: plot for part in parts for n, plot in part.plots.items()})
     document.setHtml("".join(_anchored(parts)))
     document.setPageSize(QSizeF(WIDTH, ROOM))
@@ -140,14 +135,23 @@ def lay_out(parts: Sequence[Piece]) -> QTextDocument:
     return document
 
 
+def _document() -> QTextDocument:
+    """Return a document without content, in the style of the reports."""
+    document = QTextDocument()
+    document.setUseDesignMetrics(True)
+    document.setDocumentMargin(0)
+    document.setDefaultFont(print_font(PrintSize.BODY))
+    document.setDefaultStyleSheet(_style_sheet())
+    return document
+
+
 def paint_page(
     report: PrintReport, document: QTextDocument, number: int, painter: QPainter
 ) -> None:
     """Draw a page of the laid out report, in dots from the corner of the paper."""
     painter.save()
     painter.translate(LEFT_MARGIN, 0)
-    _paint_header(report.margins, painter)
-    _paint_footer(report.margins, number, document.pageCount(), painter)
+    _paint_margins(report.margins, number, document.pageCount(), painter)
     shown = QRectF(0, (number - 1) * ROOM, WIDTH, ROOM)
     painter.translate(0, TOP - shown.top())
     for block in _blocks(document):
@@ -207,68 +211,45 @@ def _place(document: QTextDocument, block: QTextBlock) -> QRectF:
     return document.documentLayout().blockBoundingRect(block)
 
 
-def _write(
-    painter: QPainter,
-    area: QRectF,
-    text: str,
-    size: float,
-    color: str = LIGHT.text,
-    align: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
-    *,
-    bold: bool = False,
-) -> None:
-    """Draw words in one line at the top of an area."""
-    painter.setFont(print_font(size, bold=bold))
-    painter.setPen(QColor(color))
-    flags = align | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextDontClip
-    painter.drawText(area, flags, printed_text(text))
-
-
 def _line_pen(color: str, width: float = 5.0) -> QPen:
     pen = QPen(QColor(color), width)
     pen.setCapStyle(Qt.PenCapStyle.FlatCap)
     return pen
 
 
-def _paint_header(margins: Margins, painter: QPainter) -> None:
-    title = QRectF(0, HEADER, WIDTH / 2, PrintSize.BODY)
-    _write(painter, title, margins.title, PrintSize.BODY, bold=True)
-    below = title.translated(0, 1.7 * PrintSize.BODY)
-    _write(painter, below, margins.subject, PrintSize.BODY, LIGHT.muted)
-    right = QRectF(WIDTH / 2, HEADER, WIDTH / 2, PrintSize.BODY)
-    at_right = Qt.AlignmentFlag.AlignRight
-    _write(painter, right, margins.number, PrintSize.BODY, LIGHT.muted, at_right)
-    _paint_badges(margins.badges, painter)
-    painter.setPen(_line_pen(LIGHT.edge))
-    line = round(HEADER + 3.6 * PrintSize.BODY)
-    painter.drawLine(0, line, round(WIDTH), line)
-
-
-def _paint_badges(badges: Sequence[str], painter: QPainter) -> None:
-    """Draw framed badges from the right; their words do not depend on colour."""
-    right, top = WIDTH, HEADER + 1.6 * PrintSize.BODY
-    metrics = QFontMetricsF(print_font(PrintSize.BODY, bold=True))
-    for text in reversed(badges):
-        width = metrics.horizontalAdvance(text) + 2 * BADGE_PADDING
-        frame = QRectF(right - width, top, width, 1.55 * PrintSize.BODY)
-        painter.setPen(_line_pen(LIGHT.bad, 10))
-        painter.drawRect(frame)
-        inner = frame.adjusted(BADGE_PADDING, 6, BADGE_PADDING, 0)
-        _write(painter, inner, text, PrintSize.BODY, LIGHT.bad, bold=True)
-        right -= width + BADGE_PADDING
-
-
-def _paint_footer(
+def _paint_margins(
     margins: Margins, number: int, n_pages: int, painter: QPainter
 ) -> None:
-    top = PAGE_HEIGHT - FOOTER
+    """Draw header and footer, apart from the page by lines."""
+    # Badges have a frame: their words do not depend on colour.
+    badges = "".join(f'<td class="badge">{markup(e)}</td>' for e in margins.badges)
+    pages = translate("paper", "Page {0} of {1}").format(number, n_pages)
+    bottom = PAGE_HEIGHT - FOOTER
+    for top, kind, left, right in (
+        (HEADER, "title", markup(margins.title), markup(margins.number)),
+        (HEADER + LINE, "subject", markup(margins.subject), ""),
+        (bottom + LINE / 6, "foot", markup(margins.foot), markup(pages)),
+    ):
+        _paint_html(
+            f'<table width="100%" cellspacing="0"><tr><td class="{kind}">{left}</td>'
+            f'<td class="margin {kind}" align="right">{right}</td></tr></table>',
+            *(top, painter),
+        )
+    frames = f'<table align="right" cellspacing="40"><tr>{badges}</tr></table>'
+    _paint_html(frames, HEADER + 0.7 * LINE, painter)
     painter.setPen(_line_pen(LIGHT.edge))
-    painter.drawLine(0, round(top), round(WIDTH), round(top))
-    area = QRectF(0, top + 25, WIDTH, PrintSize.SMALL)
-    _write(painter, area, margins.foot, PrintSize.SMALL, LIGHT.muted)
-    text = translate("paper", "Page {0} of {1}").format(number, n_pages)
-    at_right = Qt.AlignmentFlag.AlignRight
-    _write(painter, area, text, PrintSize.SMALL, LIGHT.text, at_right)
+    for line in (HEADER + 2.2 * LINE, bottom):
+        painter.drawLine(0, round(line), round(WIDTH), round(line))
+
+
+def _paint_html(html: str, top: float, painter: QPainter) -> None:
+    document = _document()
+    document.setHtml(html)
+    document.setTextWidth(WIDTH)
+    painter.save()
+    painter.translate(0, top)
+    document.drawContents(painter)
+    painter.restore()
 
 
 # Qt names it among the colours of each page and draws in none of it; PDF/A-1 has no

@@ -1,7 +1,6 @@
 """The stream of positions in the window: its dialog and its server."""
 
 from dataclasses import dataclass
-from functools import partial
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QFormLayout, QWidget
@@ -23,9 +22,7 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.measure.probing.current_tip import read_tip_in_force
-from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.stream.messages import StreamedTip, tip_metadata
 from lightpen_extensions.stream.server import (
     LAST_PORT,
@@ -33,7 +30,6 @@ from lightpen_extensions.stream.server import (
     PoseStream,
     StreamPlace,
     StreamStatus,
-    points_of,
 )
 
 EVERYWHERE = "0.0.0.0"  # every network of the computer
@@ -284,9 +280,6 @@ class StreamService(Service):
         workbench.selection.changed.connect(self._on_selected)
         workbench.run.result_changed.connect(self.streaming.read_tip)
         self.streaming.changed.connect(self._show)
-        for part in workbench.parts:
-            if isinstance(part, VerificationRun):
-                part.changed.connect(partial(self._stream_points, part))
 
         self._on_selected()
         self._follow()
@@ -334,13 +327,6 @@ class StreamService(Service):
 
     def _on_selected(self) -> None:
         self.streaming.choose(self._selection.preparation)
-
-    def _stream_points(self, run: VerificationRun) -> None:
-        status, stream = run.status, self.streaming.stream
-        if not stream.is_heard or status.setup is None or status.state is None:
-            return
-        if status.setup.task is PART:
-            stream.set_points(points_of(status.setup, status.state))
 
     def _show(self) -> None:
         streaming, notices = self.streaming, self._notices

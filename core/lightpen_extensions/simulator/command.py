@@ -84,12 +84,6 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help="distance from the first to the last camera",
     )
-    parser.add_argument(
-        "--pen",
-        choices=("paper", "six", "eight", "near-symmetric", "fanned"),
-        default="paper",
-        help="layout of the LEDs",
-    )
 
 
 def _n_images(text: str) -> int:
@@ -105,14 +99,8 @@ def _n_images(text: str) -> int:
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen_extensions.simulator.scene_files import write_rig_scene, write_scene
-    from lightpen_extensions.simulator.scenes import (
-        LEDS,
-        SAMPLE_PENS,
-        Scene,
-        Sensor,
-        row_of_cameras,
-    )
-    from lightpen_extensions.simulator.swings import paper_camera
+    from lightpen_extensions.simulator.scenes import LEDS, Scene, Sensor, row_of_cameras
+    from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
     looks = LEDS[options.leds]
 
@@ -123,7 +111,7 @@ def _simulate(options: argparse.Namespace) -> None:
         sensor=Sensor(bits=options.bits),
         faces=looks.faces,
         optics=replace(looks.optics, psf_sigma=options.blur),
-        pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
+        pen=replace(paper_pen(), diameter=options.led_diameter),
         camera=paper_camera(options.binning),
     )
     with progress("Rendering") as report:

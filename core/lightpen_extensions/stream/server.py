@@ -11,7 +11,7 @@ import selectors
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -24,59 +24,7 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
 from lightpen.formats.files import strerror
 from lightpen.messages import Message, message, printable
-from lightpen_extensions.measure.session import SessionSetup, SessionState
-from lightpen_extensions.measure.tasks.part import PART, planned_at
 from lightpen_extensions.stream.messages import StreamedTip, pose_messages
-
-POINTS = "Points"
-
-
-@dataclass(frozen=True)
-class NamedPoint:
-    """A probed point: its feature, its number there from 1, camera frame, mm."""
-
-    feature: str
-    number: int
-    place: tuple[float, ...]
-
-
-def points_of(setup: SessionSetup, state: SessionState) -> tuple[NamedPoint, ...]:
-    """Return the points of a part so far, in their order."""
-    found = state.found_by(PART)
-    if found is not None:
-        named = list(found.points)
-    else:
-        named = []
-        for i, points in enumerate((*state.runs, state.touches)):
-            planned = planned_at(setup.choices, i)
-            named += [("" if planned is None else planned.name, p) for p in points]
-    counts: dict[str, int] = {}
-    result = []
-    for name, point in named:
-        counts[name] = counts.get(name, 0) + 1
-        result.append(NamedPoint(name, counts[name], tuple(point.point_cam.tolist())))
-    return tuple(result)
-
-
-def points_message(points: Sequence[NamedPoint], at: float) -> bytes:
-    """Return the message of points; ``at`` is the time, s since 1970 (UTC)."""
-    # Not there without the extra "stream", and not needed before a client connects.
-    from pyigtl import PointMessage
-
-    message = PointMessage(
-        positions=[each.place for each in points],
-        names=[_ascii(f"{each.feature} {each.number}", 64) for each in points],
-        groups=[_ascii(each.feature, 32) for each in points],
-        timestamp=at,
-        device_name=POINTS,
-    )
-    return bytes(message.pack())
-
-
-def _ascii(text: str, length: int) -> str:
-    """Return a text as a field of the message holds it."""
-    return text.encode("ascii", "backslashreplace").decode()[: length - 1]
-
 
 LOOPBACK = "127.0.0.1"  # for programs of this computer only
 PORT = 18944  # the default port of OpenIGTLink
@@ -130,7 +78,6 @@ class _Client:
     connection: socket.socket
     rest: bytes = b""
     newest: bytes = b""
-    points: tuple[NamedPoint, ...] = ()  # sent last
     active_s: float = field(default_factory=time.monotonic)  # it took or sent data
     waiting_s: float = field(default_factory=time.monotonic)  # since when data waits
     misses: deque[bool] = field(default_factory=lambda: deque(maxlen=RECENT))
@@ -141,12 +88,6 @@ class _Client:
         if not self.is_waiting:
             self.waiting_s = time.monotonic()
         self.newest = data
-
-    def add_points(self, points: tuple[NamedPoint, ...], at: float) -> None:
-        """Send named points if they are others; none is missed."""
-        if points and points != self.points:
-            self.rest += points_message(points, at)
-        self.points = points
 
     @property
     def is_slow(self) -> bool:
@@ -196,7 +137,6 @@ class PoseStream:
         self._status = StreamStatus()
         self._tip: StreamedTip | None = None
         self._newest: _Seen | None = None
-        self._points: tuple[NamedPoint, ...] = ()
         self._lock = Lock()
         self._waker: socket.socket | None = None
         self._thread: Thread | None = None
@@ -244,10 +184,6 @@ class PoseStream:
     def set_tip(self, tip: StreamedTip | None) -> None:
         """Stream the position of another tip from the next image on."""
         self._tip = tip
-
-    def set_points(self, points: tuple[NamedPoint, ...]) -> None:
-        """Stream the points of a part with the next image that shows the pen."""
-        self._points = points
 
     def take(self, frame: Frame, detection: PenDetection | None) -> None:
         """Stream a detection if it shows the pen; returns at once."""
@@ -303,7 +239,6 @@ class PoseStream:
         sent = pose_messages(seen.detection, self._tip, seen.number, seen.at)
         for client in clients:
             client.offer(sent)
-            client.add_points(self._points, seen.at)
 
     def _report(self, status: StreamStatus) -> None:
         self._status = status

@@ -8748,26 +8748,6 @@
 <context>
     <name>paper</name>
     <message>
-        <source>rms</source>
-        <translation>均方根</translation>
-    </message>
-    <message>
-        <source>mean x</source>
-        <translation>x 均值</translation>
-    </message>
-    <message>
-        <source>mean y</source>
-        <translation>y 均值</translation>
-    </message>
-    <message>
-        <source>Residuals by LED / px</source>
-        <translation>各 LED 的残差 / px</translation>
-    </message>
-    <message>
-        <source>LED</source>
-        <translation>LED</translation>
-    </message>
-    <message>
         <source>included</source>
         <translation>已计入</translation>
     </message>

@@ -6,9 +6,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
+from tests.simulated_pens import fanned_pen
 
 from lightpen_app.widgets.pen_view import PenPicture, PenView
-from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 LEFT = Qt.MouseButton.LeftButton

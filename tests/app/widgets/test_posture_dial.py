@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
+from tests.simulated_pens import eight_led_pen
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.model.coverage import measure_coverage
@@ -20,7 +21,6 @@ from lightpen_app.widgets.posture_dial import (
     field_of,
     place_of,
 )
-from lightpen_extensions.simulator.scenes import eight_led_pen
 
 SIDE = 600
 RIM = 0.435 * SIDE

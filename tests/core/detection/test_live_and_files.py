@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from tests.simulated_disturbances import HARD, Finger, Glare, plan_disturbed
+from tests.simulated_pens import six_led_pen
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
@@ -27,7 +28,7 @@ from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
-from lightpen_extensions.simulator.scenes import Scene, Sensor, six_led_pen
+from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import flat_pen, leds_in_camera
 from lightpen_extensions.simulator.view import Lamp
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_pens import SAMPLE_PENS
 
 from lightpen.cameras.protocol import (
     CameraSettings,
@@ -30,7 +31,6 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen_extensions.simulator.camera import SkippingClock
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 
 if TYPE_CHECKING:

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_pens import SAMPLE_PENS, six_led_pen
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.model.pen import Pen, check_frame
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.frame import OpenedPen, examine_frame, moved_into_frame
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS, six_led_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()

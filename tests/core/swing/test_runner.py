@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from tests.simulated_pens import SAMPLE_PENS
 
 from lightpen.cameras.protocol import CameraSettings, WorkerEvent
 from lightpen.estimation.reports.verdict import Grade
@@ -24,7 +25,6 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen.swing.swing_recorder import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -5,9 +5,9 @@ import pytest
 from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
+from tests.simulated_pens import fanned_pen
 
 from lightpen_app.steps.leds.table_panel import MISFIT, LedTable
-from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 from tests.app.undressed import undressed
 from tests.faulty_camera import FaultyCamera
+from tests.simulated_pens import fanned_pen, six_led_pen
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
@@ -36,7 +37,7 @@ from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.scenes import Scene, fanned_pen, six_led_pen
+from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_pen
 
 if TYPE_CHECKING:

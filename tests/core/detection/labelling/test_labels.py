@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.labelling import spots_at
+from tests.simulated_pens import SAMPLE_PENS
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.causes import diagnose
@@ -21,7 +22,6 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.simulator.swings import flat_pen, paper_camera, paper_pen
 
 CAMERA = paper_camera()

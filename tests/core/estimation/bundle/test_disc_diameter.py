@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_centers import observe_pixels
+from tests.simulated_pens import fanned_pen
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
@@ -18,7 +19,6 @@ from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rig_of
-from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import (
     leds_in_camera,
     paper_camera,

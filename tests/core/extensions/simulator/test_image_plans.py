@@ -11,11 +11,12 @@ from tests.simulated_disturbances import (
     flags_of,
     plan_disturbed,
 )
+from tests.simulated_pens import SAMPLE_PENS
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import Image
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS, Scene
+from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     leds_in_camera,

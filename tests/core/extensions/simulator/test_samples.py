@@ -1,12 +1,6 @@
 import numpy as np
 import pytest
-
-from lightpen_extensions.simulator.scenes import (
-    NEARLY,
-    SAMPLE_PENS,
-    fanned_pen,
-    near_symmetric_pen,
-)
+from tests.simulated_pens import NEARLY, SAMPLE_PENS, fanned_pen, near_symmetric_pen
 
 
 @pytest.mark.parametrize("name", SAMPLE_PENS)

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.simulated_disturbances import slip_tip
+from tests.simulated_pens import SAMPLE_PENS
 
 from lightpen.model.ellipse import ellipse_centers
-from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,

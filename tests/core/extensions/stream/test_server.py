@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.small_records import SMALL
-from pyigtl import OpenIGTLinkClient, PointMessage, TransformMessage
+from pyigtl import OpenIGTLinkClient, TransformMessage
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame, sealed
@@ -42,7 +42,6 @@ from lightpen_extensions.stream.messages import StreamedTip, pose_messages, tip_
 from lightpen_extensions.stream.server import (
     LOOPBACK,
     MOST_CLIENTS,
-    NamedPoint,
     PoseStream,
     StreamError,
     StreamPlace,
@@ -237,24 +236,6 @@ def test_a_message_tells_when_its_image_was_taken(
 
     taken = received(client, "PenToCamera").timestamp
     assert before - 100.1 < taken < after - 99.9
-
-
-def test_named_points_are_sent_once_to_every_client(
-    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
-) -> None:
-    hole = NamedPoint("hole 1", 1, (1.0, 2.0, 3.0))
-    stream.set_points((hole, NamedPoint("h\u00f6he", 1, (4.0, 5.0, 6.0))))
-    for number in range(3):
-        stream.take(frame(number), detection)
-        received(client, "PenToCamera")
-
-    message = client.wait_for_message("Points", timeout=LONGEST)
-    assert isinstance(message, PointMessage)
-    assert message.names == ["hole 1 1", "h\\xf6he 1"]
-    assert message.groups == ["hole 1", "h\\xf6he"]
-    np.testing.assert_allclose(message.positions, [[1, 2, 3], [4, 5, 6]])
-    later = client.get_latest_messages()
-    assert "Points" not in {each.device_name for each in later}
 
 
 def test_an_image_without_the_pen_sends_nothing(
