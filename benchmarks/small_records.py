@@ -60,7 +60,6 @@ SMALL: Mapping[str, Any] = {
         "image_fields": [],
     },
     "assumptions": {},
-    "fixed_lamps": [],
     "instrument": {
         "intrinsics": [2000.0, 2000.0, 600.0, 500.0],
         "disc_diameter_mm": 10.0,

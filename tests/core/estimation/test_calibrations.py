@@ -74,18 +74,12 @@ def text_of(calibration: Calibration) -> str:
     return calibration_text(calibration, INPUTS.nominal_tip, verdict)
 
 
-def test_record_and_text_have_the_lamps_that_were_followed(
-    calibrated: Calibrated,
-) -> None:
+def test_the_text_has_the_lamps_that_were_followed(calibrated: Calibrated) -> None:
     found = calibrated("followed")
     path = found.cameras[0].path
     assert path is not None
     assert path.is_followed
 
-    (lamps,) = recorded(found)["fixed_lamps"]
-    np.testing.assert_allclose(lamps["places_px"], path.lamps)
-    np.testing.assert_allclose(lamps["shifts_px"], path.shifts)
-    assert lamps["moved_px"] == path.moved
     text = text_of(found)
     assert f"2 in view; moved by {path.moved:.2f} px, which is corrected" in text
 

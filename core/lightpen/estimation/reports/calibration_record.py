@@ -211,17 +211,6 @@ class SelfCheckRecord(Struct, frozen=True):
     limit: float
 
 
-class LampRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The fixed lamps in view of a camera."""
-
-    camera: str = ""
-    places_px: tuple[Pair, ...]
-    noise_px: Number
-    moved_px: Number
-    is_taken_out: bool
-    shifts_px: tuple[Pair, ...]
-
-
 class OtherCameraRecord(Struct, frozen=True):
     """A camera of a rig but the first, as fitted."""
 
@@ -418,8 +407,6 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
         Findings to check; their codes stay when the wording changes.
     assumptions
         Default values for what the files do not state.
-    fixed_lamps
-        One entry for each camera with fixed lamps in view.
     self_check
         Comparison of one half of the LEDs with the other.
     instrument
@@ -452,7 +439,6 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     uncertainty: UncertaintyRecord
     adjusted: AdjustmentRecord
     assumptions: Assumptions
-    fixed_lamps: tuple[LampRecord, ...]
     instrument: InstrumentRecord
     weakest_direction: DirectionRecord
     coverage: CoverageRecord

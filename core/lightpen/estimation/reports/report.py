@@ -26,7 +26,6 @@ from lightpen.estimation.reports.calibration_record import (
     ImageFieldRecord,
     InputsRecord,
     InstrumentRecord,
-    LampRecord,
     LedRecord,
     MethodRecord,
     OtherCameraRecord,
@@ -91,7 +90,6 @@ def calibration_record(
         uncertainty=_uncertainty(calibration),
         adjusted=_adjusted(calibration),
         assumptions=calibration.assumptions,
-        fixed_lamps=_lamps(calibration),
         instrument=_instrument(calibration.instrument),
         weakest_direction=DirectionRecord(
             vector_pen=plain(result.budget.weakest_direction),
@@ -219,23 +217,6 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
             )
             for each in calibration.fields
         ),
-    )
-
-
-def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:
-    """Return the fixed lamps of each camera."""
-    names = calibration.bundle.state.rig.names or ("",)
-    return tuple(
-        LampRecord(
-            camera=name,
-            places_px=plain(images.path.lamps),
-            noise_px=plain(images.path.noise),
-            moved_px=plain(images.path.moved),
-            is_taken_out=bool(images.path.is_followed),
-            shifts_px=plain(images.path.shifts),
-        )
-        for name, images in zip(names, calibration.cameras, strict=True)
-        if images.path is not None
     )
 
 

@@ -105,9 +105,6 @@ class Budget:
     shares: tuple[UncertaintyContribution, ...]
     # (6, 6), from image noise as if it were independent between images, mm^2.
     independent_noise: FloatArray
-    # (6, 6), from the scatter between blocks of consecutive images, all but tip and
-    # cone held, mm^2; None with too few images.
-    blocks: FloatArray | None
     # Variance between blocks over that of independent noise and jitter; 1 on average.
     block_ratio: float
     # Of a coordinate's errors in successive images; 0 if not significant.
@@ -161,13 +158,12 @@ class SplitHalfCheck:
 def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     """Make the budget of an adjustment; ``joint`` is the joint fit at its estimate."""
     bundle, correlation = adjustment.bundle, adjustment.correlation
-    blocks, ratio, blocks_count = _block_scatter(joint, bundle)
+    ratio, blocks_count = _block_scatter(joint, bundle)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     n_images = int(bundle.used.any(axis=(1, 2)).sum())
     return Budget(
         shares=contributions_of(bundle, n_images, raised * correlation.noise),
         independent_noise=bundle.independent_noise,
-        blocks=blocks,
         block_ratio=ratio,
         autocorrelation=correlation.coefficient,
         correlation_factor=raised * correlation.factor,
@@ -345,17 +341,15 @@ def compare_halves(joint: JointFit) -> SplitHalfCheck:
     )
 
 
-def _block_scatter(
-    joint: JointFit, bundle: Bundle
-) -> tuple[FloatArray | None, float, bool]:
-    """Return covariance from blocks (6, 6), equation (20), ratio, and significance.
+def _block_scatter(joint: JointFit, bundle: Bundle) -> tuple[float, bool]:
+    """Return the ratio of equation (20), and whether it is significant.
 
     Seat modes, drift and jitter are contributions of their own and taken out.
     """
     n_images = len(joint.information)
     n_blocks = min(MAX_BLOCKS, n_images // MIN_BLOCK_SIZE)
     if n_blocks < 3:
-        return None, 1.0, False
+        return 1.0, False
     noise = joint.covariance
     by_cone = joint.information[..., N_CONE:]
     moved = np.einsum("nik,nk->ni", by_cone, bundle.cone_moves[:n_images])
@@ -365,14 +359,13 @@ def _block_scatter(
     )
     scores -= scores.mean(axis=0)
     scatter = scores.T @ scores * n_blocks / (n_blocks - 1)
-    blocks = noise @ scatter @ noise
     ratio = float(np.trace(noise @ scatter)) / 6
     jitter = bundle.components.jitter.covariance
     if jitter is not None:
         shaken = np.einsum("nik,kl,njl->ij", by_cone, jitter, by_cone, optimize=True)
         ratio /= 1 + float(np.trace(noise @ shaken)) / 6
     n_free = 6 * (n_blocks - 1)
-    return blocks, ratio, ratio > chi_square_quantile(n_free, BY_CHANCE) / n_free
+    return ratio, ratio > chi_square_quantile(n_free, BY_CHANCE) / n_free
 
 
 # Repeatability of the distance of the cone from swing to swing.

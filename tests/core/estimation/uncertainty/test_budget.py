@@ -286,7 +286,7 @@ def test_too_few_images_for_blocks_are_said_so() -> None:
     some = of_images(fit(0.01 * lasting(4, 0.0, 100)), slice(8))
     budget = combine(adjusted(calibration), some)
 
-    assert budget.blocks is None
+    assert budget.block_ratio == 1
     assert budget.correlation_factor == 1
 
 
