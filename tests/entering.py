@@ -8,7 +8,7 @@ from pathlib import Path
 from msgspec import structs
 
 from lightpen.archive.logbook import Logbook
-from lightpen.record.library.library_changes import Author, change_item, known_item
+from lightpen.record.library.library_changes import Author, change_item
 from lightpen.record.library.signing import (
     OwedFile,
     forget_owed,
@@ -46,6 +46,6 @@ def retire_item(
     is_retired: bool = True,
 ) -> Library:
     """Retire an item of the library, or bring it back; see `add_item`."""
-    item = known_item(read_library(data), kind, name)
+    item = read_library(data).items(kind)[name]
     retired = structs.replace(item, is_retired=is_retired)
     return change_item(data, retired, by, now, before=item)

@@ -19,6 +19,4 @@ MESSAGES = {
     "cli.window-needs-camera": "--binning and --roi tell how the images differ from those of a camera file. Give it by --camera.",
     "cli.window-written": "The camera file for these images is {file}. It can be given without --binning and --roi.",
     "cli.pen-over-raw": "{out} would replace its input, the measured LEDs. Give the LED file another name.",
-    "library.no-entry": "'{entry}' is not an entry of a {kind}. Give --set ENTRY=VALUE with one of {known}.",
-    "library.bad-entry": "'{value}' is not a valid {entry}: {why}.",
 }

@@ -96,14 +96,6 @@ def change_item(
             return _keep(data, number, item, by, now)
 
 
-def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
-    """Return an item of a library, or raise `UsageError`."""
-    found = library.item(kind, name)
-    if found is None:
-        raise UsageError(no_such_item(kind, name))
-    return found
-
-
 def no_such_item(kind: ItemKind, name: str) -> Message:
     """Return the error that an item is not in the library."""
     return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
