@@ -41,6 +41,7 @@ FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
 # Standard deviations of a board's shape, which the views tell: relative, and mm.
 SQUARENESS, FLATNESS = 0.1, 5.0
+_SHARED, _OWN = slice(None, -N_POSE), slice(-N_POSE, None)  # unknowns of a system
 VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
 
 
@@ -78,7 +79,7 @@ class BoardFit:
     @property
     def board_points(self) -> FloatArray:
         """Points of the board with its estimated shape, (N, 3), mm."""
-        return board_points(self.board, self.state.shape) + self.state.offsets
+        return _shaped(self.board, self.state)
 
     @property
     def rms(self) -> float:
@@ -97,17 +98,6 @@ class BoardFit:
     def of_intrinsics(self, camera: int) -> slice:
         """Return the indices of the intrinsics of a camera."""
         return intrinsics_at(self.state.cameras)[camera]
-
-    @property
-    def of_places(self) -> slice:
-        """Indices of the extrinsics of all cameras but the first."""
-        return places_at(self.state.cameras)
-
-    @property
-    def of_shape(self) -> slice:
-        """Indices of the errors of the board."""
-        at = self.of_places
-        return slice(at.stop, at.stop + N_SHAPE)
 
 
 def board_points(board: Board, shape: FloatArray) -> FloatArray:
@@ -143,14 +133,11 @@ def places_at(cameras: tuple[Camera, ...]) -> slice:
 
 
 class _System(NamedTuple):
-    """Normal equations for points of 1 px noise, view by view."""
+    """Normal equations for points of 1 px noise, view by view; its pose comes last."""
 
     residuals: FloatArray
-    shared: FloatArray
-    right: FloatArray
-    cross: FloatArray
-    own: FloatArray
-    own_right: FloatArray
+    normal: FloatArray  # (V, p + 6, p + 6)
+    right: FloatArray  # (V, p + 6)
 
 
 class LinearSight(NamedTuple):
@@ -214,8 +201,7 @@ def adjust_board(
 
 def fit_board_poses(views: Views, state: BoardState) -> BoardFit:
     """Return the fit of the poses alone; its covariance is as of the held numbers."""
-    n = sum(len(camera.intrinsics) for camera in state.cameras)
-    held = np.diag(np.full(n + N_POSE * (len(state.cameras) - 1) + N_SHAPE, 1e20))
+    held = np.diag(np.full(places_at(state.cameras).stop + N_SHAPE, 1e20))
     found, system = _settled(views, state, state, held, 1.0)
     information, scores = _eliminated(system)
     rms = _rms(system.residuals)
@@ -232,19 +218,22 @@ def _settled(
     if np.isinf(residuals).any():
         raise CalibrationError("intrinsics.no-start", board=views.board.name)
     system = _system(views, state, residuals)
-    cost = _cost_of(system.residuals, state, origin, prior, sigma)
+    away = _away(state, origin)
+    cost = _cost_of(residuals, away, prior, sigma)
     for _ in range(MAX_STEPS):
-        step, poses_step = _step(system, state, origin, prior, sigma, damping)
+        step, poses_step = _step(system, away, prior, sigma, damping)
         moved = moved_state(state, step, poses_step)
         there = board_residuals(views, moved)
-        reached = _cost_of(there, moved, origin, prior, sigma)
+        away_there = _away(moved, origin)
+        reached = _cost_of(there, away_there, prior, sigma)
         if not reached <= cost:
             damping *= 10
             if damping > MAX_DAMPING:
                 return state, system
             continue
         gained = cost - reached
-        state, cost, damping = moved, reached, max(damping / 10, 1e-12)
+        state, away, cost = moved, away_there, reached
+        damping = max(damping / 10, 1e-12)
         system = _system(views, state, there)
         if gained <= CONVERGED * (cost + 1e-12):
             return state, system
@@ -252,23 +241,17 @@ def _settled(
 
 
 def _step(
-    system: _System,
-    state: BoardState,
-    origin: BoardState,
-    prior: FloatArray,
-    sigma: float,
-    damping: float,
+    system: _System, away: FloatArray, prior: FloatArray, sigma: float, damping: float
 ) -> tuple[FloatArray, FloatArray]:
-    weight = sigma**-2
-    own = weight * system.own
+    normal, right_of_each = system.normal / sigma**2, system.right / sigma**2
+    own, own_right = normal[:, _OWN, _OWN], right_of_each[:, _OWN]
     # A view without points leaves nothing to divide by.
     own = own + (damping * (own * np.eye(N_POSE)) + 1e-12 * np.eye(N_POSE))
-    shared = weight * system.shared.sum(axis=0) + prior
+    shared = normal[:, _SHARED, _SHARED].sum(axis=0) + prior
     shared = shared + damping * np.diag(np.diag(shared))
-    right = weight * system.right.sum(axis=0) - prior @ _away(state, origin)
-    cross = weight * system.cross
+    right = right_of_each[:, _SHARED].sum(axis=0) - prior @ away
+    cross = normal[:, _SHARED, _OWN]
     solved = np.linalg.solve(own, np.swapaxes(cross, 1, 2))
-    own_right = weight * system.own_right
     reduced = shared - np.einsum("vpi,viq->pq", cross, solved)
     reduced_right = right - np.einsum("viq,vi->q", solved, own_right)
     scale = 1 / np.sqrt(np.maximum(np.diag(shared), 1e-300))
@@ -282,22 +265,16 @@ def _step(
 
 def _eliminated(system: _System) -> tuple[FloatArray, FloatArray]:
     """Return information and score of each view about all but its pose."""
-    solved = np.linalg.solve(
-        system.own + 1e-12 * np.eye(N_POSE), np.swapaxes(system.cross, 1, 2)
-    )
-    information = system.shared - system.cross @ solved
-    scores = system.right - np.einsum("viq,vi->vq", solved, system.own_right)
-    return information, scores
+    own, cross = (system.normal[:, each, _OWN] for each in (_OWN, _SHARED))
+    solved = np.linalg.solve(own + 1e-12 * np.eye(N_POSE), np.swapaxes(cross, 1, 2))
+    information = system.normal[:, _SHARED, _SHARED] - cross @ solved
+    of_poses = np.einsum("viq,vi->vq", solved, system.right[:, _OWN])
+    return information, system.right[:, _SHARED] - of_poses
 
 
 def _cost_of(
-    residuals: FloatArray,
-    state: BoardState,
-    origin: BoardState,
-    prior: FloatArray,
-    sigma: float,
+    residuals: FloatArray, away: FloatArray, prior: FloatArray, sigma: float
 ) -> float:
-    away = _away(state, origin)
     return float(np.nansum(np.square(residuals)) / sigma**2 + away @ prior @ away)
 
 
@@ -343,35 +320,27 @@ def _points_cam(board: Board, state: BoardState) -> tuple[FloatArray, FloatArray
 
     (V, N, 3) and (V, C, N, 3).
     """
-    true = board_points(board, state.shape) + state.offsets
-    turned = true @ np.swapaxes(state.poses.rotations, 1, 2)
+    turned = _shaped(board, state) @ np.swapaxes(state.poses.rotations, 1, 2)
     in_rig = turned + state.poses.translations[:, None]
     in_cameras = np.einsum("cij,vnj->vcni", state.rotations, in_rig)
     return turned, in_cameras + state.translations[None, :, None]
 
 
-def _modelled(
-    camera: Camera, points: FloatArray, board: Board, normals: FloatArray
-) -> FloatArray:
-    if not board.kind.is_circles:
-        return camera.project(points)
-    return disc_centroids(camera, points, normals[:, None], 0.5 * board.detail)
-
-
-def _normals(state: BoardState) -> FloatArray:
-    """Return the normals of the board, (V, C, 3), in the cameras."""
-    normals = state.poses.rotations[..., 2]
-    return np.asarray(np.einsum("cij,vj->vci", state.rotations, normals))
+def _shaped(board: Board, state: BoardState) -> FloatArray:
+    return board_points(board, state.shape) + state.offsets
 
 
 def board_residuals(views: Views, state: BoardState) -> FloatArray:
     """Return observed minus modelled points, (V, C, N, 2), px; NaN where not seen."""
-    _, points = _points_cam(views.board, state)
-    normals = _normals(state)
+    board, (_, points) = views.board, _points_cam(views.board, state)
+    normals = state.poses.rotations[..., 2]
     residuals = np.empty_like(views.pixels)
     with np.errstate(all="ignore"):  # a step too far is not taken
         for c, camera in enumerate(state.cameras):
-            at = _modelled(camera, points[:, c], views.board, normals[:, c])
+            at = camera.project(points[:, c])
+            if board.kind.is_circles:
+                faced = (normals @ state.rotations[c].T)[:, None]
+                at = disc_centroids(camera, points[:, c], faced, 0.5 * board.detail)
             left = views.pixels[:, c] - at
             is_far = (points[:, c, :, 2:] <= 0) | ~np.isfinite(left)
             residuals[:, c] = np.where(is_far, np.inf, left)
@@ -381,26 +350,14 @@ def board_residuals(views: Views, state: BoardState) -> FloatArray:
 
 def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
     n_views = views.n_views
-    n_shared = places_at(state.cameras).stop + N_SHAPE
-    total = _System(
-        residuals,
-        np.zeros((n_views, n_shared, n_shared)),
-        np.zeros((n_views, n_shared)),
-        np.zeros((n_views, n_shared, N_POSE)),
-        np.zeros((n_views, N_POSE, N_POSE)),
-        np.zeros((n_views, N_POSE)),
-    )
+    normal = right = np.zeros(())
     for sight in linearise(views, state, residuals):
-        shared = sight.shared.reshape(n_views, -1, n_shared)
-        own = sight.own.reshape(n_views, -1, N_POSE)
-        left = sight.residuals.reshape(n_views, -1, 1)
-        across = np.swapaxes(shared, 1, 2)
-        total.shared[:] += across @ shared
-        total.right[:] += (across @ left)[..., 0]
-        total.cross[:] += across @ own
-        total.own[:] += np.swapaxes(own, 1, 2) @ own
-        total.own_right[:] += (np.swapaxes(own, 1, 2) @ left)[..., 0]
-    return total
+        columns = np.concatenate([sight.shared, sight.own], axis=-1)
+        columns = columns.reshape(n_views, -1, columns.shape[-1])
+        across = np.swapaxes(columns, 1, 2)
+        normal = normal + across @ columns
+        right = right + (across @ sight.residuals.reshape(n_views, -1, 1))[..., 0]
+    return _System(residuals, normal, right)
 
 
 def linearise(

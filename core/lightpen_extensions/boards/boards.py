@@ -32,6 +32,11 @@ FORMS = (
     "chessboard:11x8:20, charuco:12x9:20:15:DICT_5X5_100, circles:9x7:20:10, "
     "asymmetric-circles:4x11:20:10"
 )
+_LENGTH = r"(\d+(?:\.\d*)?|\.\d+)"
+_FORM = (
+    r"(?ai)(chessboard|charuco|circles|asymmetric-circles):(\d{1,3})x(\d{1,3})"
+    rf":{_LENGTH}(?::{_LENGTH})?(?::(\w+))?"
+)
 
 
 class BoardKind(StrEnum):
@@ -128,33 +133,17 @@ def marker_dictionary(board: Board) -> cv2.aruco.Dictionary:
 
 def parse_board(text: str) -> Board:
     """Parse a board, see the module for the forms; `UsageError` if it is invalid."""
-    kind_word, *parts = text.strip().split(":")
-    kinds = {kind.value: kind for kind in BoardKind}
-    kind = kinds.get(kind_word.casefold())
-    counts = re.fullmatch(r"(?a:(\d{1,3})x(\d{1,3}))", parts[0]) if parts else None
-    if kind is None or counts is None:
-        raise _no_board(text)
-    n_lengths = 1 if kind is BoardKind.CHESSBOARD else 2
-    lengths = [_length(part, text) for part in parts[1 : 1 + n_lengths]]
-    words = parts[1 + n_lengths :]
-    if len(lengths) != n_lengths or len(words) != (1 if kind.has_markers else 0):
-        raise _no_board(text)
-    board = Board(
-        kind=kind,
-        columns=int(counts[1]),
-        rows=int(counts[2]),
-        pitch=lengths[0],
-        detail=lengths[1] if n_lengths > 1 else 0.0,
-        dictionary=words[0].upper() if words else "",
-    )
+    parts = re.fullmatch(_FORM, text.strip())
+    kind = BoardKind(parts[1].casefold()) if parts else None
+    n_details = {BoardKind.CHESSBOARD: 0, BoardKind.CHARUCO: 2}
+    details = [part for part in parts.groups()[4:] if part] if parts else []
+    if parts is None or kind is None or len(details) != n_details.get(kind, 1):
+        raise UsageError("board.form", text=text, forms=FORMS)
+    columns, rows, pitch, detail = int(parts[2]), int(parts[3]), parts[4], parts[5]
+    dictionary = (parts[6] or "").upper()
+    board = Board(kind, columns, rows, float(pitch), float(detail or 0), dictionary)
     _check(board, text)
     return board
-
-
-def _length(word: str, text: str) -> float:
-    if not re.fullmatch(r"(?a:\d+(\.\d*)?|\.\d+)", word):
-        raise _no_board(text)
-    return float(word)
 
 
 def _check(board: Board, text: str) -> None:
@@ -189,10 +178,6 @@ def _check(board: Board, text: str) -> None:
             dictionary=board.dictionary,
             known=known,
         )
-
-
-def _no_board(text: str) -> UsageError:
-    return UsageError("board.form", text=text, forms=FORMS)
 
 
 def _lattice(columns: int, rows: int) -> FloatArray:

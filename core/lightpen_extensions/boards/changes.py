@@ -207,8 +207,11 @@ def find_rotated(
             now = fit_camera(_turned(views, turned), now.state.cameras[0])
             if now.rms > fitted.rms * (1.0 if n_done else WORSE):
                 return none
-            ways = none, ~none
-            rms = [_by_poses(_turned(views, way), now).view_rms[:, 0] for way in ways]
+            rms = []
+            for way in (_turned(views, none), _turned(views, ~none)):
+                poses = start_board_poses(now.state.cameras[0], way)
+                fit = fit_board_poses(way, replace(now.state, poses=poses))
+                rms.append(fit.view_rms[:, 0])
             before, turned = turned, rms[1] < rms[0]
             if np.array_equal(before, turned):
                 break
@@ -234,12 +237,6 @@ def _turned(views: Views, which: BoolArray) -> Views:
     return replace(
         views, pixels=np.where(which[:, None, None, None], other, views.pixels)
     )
-
-
-def _by_poses(views: Views, fitted: BoardFit) -> BoardFit:
-    """Return the fit of the poses of views before a known camera and board."""
-    poses = start_board_poses(fitted.state.cameras[0], views)
-    return fit_board_poses(views, replace(fitted.state, poses=poses))
 
 
 def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationError:

@@ -28,7 +28,7 @@ from lightpen_extensions.boards.effects import (
     rms_together,
 )
 from lightpen_extensions.boards.observing import Views
-from lightpen_extensions.boards.start import BoardPoses, start_board_poses, start_camera
+from lightpen_extensions.boards.start import start_board_poses, start_camera
 
 FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
@@ -139,22 +139,16 @@ def fit_camera(
     views: Views, near: Camera, stiffness: tuple[float, float] = STIFFNESSES[0]
 ) -> BoardFit:
     """Fit camera, poses and board from an initial camera; see `usual_distortion`."""
-    poses = rough_poses(near, views)
+    straight = replace(near, distortion=np.zeros_like(near.distortion))
+    try:
+        poses = start_board_poses(near, views)
+    except CalibrationError:  # a lens model that folds the views
+        poses = start_board_poses(straight, views)
     state = BoardState(
         (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
-    straight = replace(near, distortion=np.zeros_like(near.distortion))
     origin = replace(state, cameras=(straight,))
     return adjust_board(views, state, (usual_distortion(near, stiffness),), origin)
-
-
-def rough_poses(near: Camera, views: Views) -> BoardPoses:
-    """Return the poses of the views, also for a lens model that folds them."""
-    try:
-        return start_board_poses(near, views)
-    except CalibrationError:
-        straight = replace(near, distortion=np.zeros(FEW), lens=LensModel.BROWN)
-        return start_board_poses(straight, views)
 
 
 # Projection uncertainty of intrinsics over the image.

@@ -145,9 +145,9 @@ def _from(views: Views, fitted: BoardFit) -> MixedFit:
     plain, longer = _design_of(views, fitted), max(views.image_sizes[0])
     found: list[_Solution] = []
     for share in LENGTHS:
-        design = _with_field(plain, views, fitted, share * longer)
         near = found[-1].components if found else None
-        found.append(_most_likely(design, near))
+        with_field = _with_field(plain, views, fitted, share * longer)
+        found.append(_most_likely(with_field, near))
     best = min(found, key=lambda each: each.deviance)
     without = _most_likely(plain, best.components)
     held_out, robust = _robust(best)

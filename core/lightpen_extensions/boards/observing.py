@@ -75,10 +75,10 @@ def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
     kept: list[int] = []
     scale = SAME * np.array([max(size) for size in views.image_sizes])
     for v in range(views.n_views):
-        if not any(_is_same(views.pixels[v], views.pixels[k], scale) for k in kept):
+        others = views.pixels[kept]
+        if not np.any(np.all(_apart(others, views.pixels[v]) <= scale, axis=-1)):
             kept.append(v)
-    which = np.zeros(views.n_views, dtype=np.bool_)
-    which[kept] = True
+    which = np.isin(np.arange(views.n_views), kept)
     return views.chosen(which), tuple(np.array(views.names)[~which].tolist())
 
 
@@ -92,19 +92,18 @@ def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
     )
 
 
-def _is_same(one: FloatArray, other: FloatArray, scale: FloatArray) -> bool:
-    """Return whether all cameras see the points (C, N, 2) at the same places."""
+def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the distances of detections (..., N, 2) of a board, px rms.
+
+    Infinite where one of them sees much that the other does not, 0 of nothing.
+    """
     squares = np.square(one - other).sum(axis=-1)
-    common = np.isfinite(squares)
-    n_seen = np.isfinite(one[..., 0]).sum(axis=-1)
-    n_other = np.isfinite(other[..., 0]).sum(axis=-1)
-    if np.any((n_seen > 0) != (n_other > 0)):
-        return False
-    n_common = common.sum(axis=-1)
-    if np.any(n_common < COMMON * np.minimum(n_seen, n_other)):
-        return False
-    sums = np.where(common, squares, 0.0).sum(axis=-1)
-    return bool(np.all(sums <= scale**2 * n_common))
+    n_common = np.isfinite(squares).sum(axis=-1)
+    n_one, n_other = (np.isfinite(each[..., 0]).sum(axis=-1) for each in (one, other))
+    means = np.nansum(squares, axis=-1) / np.maximum(n_common, 1)
+    are_alike = (n_common > 0) & (n_common >= COMMON * np.minimum(n_one, n_other))
+    is_nothing = (n_one == 0) & (n_other == 0)
+    return np.where(is_nothing, 0.0, np.where(are_alike, np.sqrt(means), np.inf))
 
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, 8 bits, and copies
@@ -172,10 +171,9 @@ def observe_board_of_rig(
         seen_by = [(c, i) for c, i in enumerate(images) if i != NONE]
         for c, i in seen_by:
             points = looks[c][i].points
-            if points is not None:
-                pixels[moment, c] = points
-        c, i = seen_by[0]
-        names.append(sources[c].names[i])
+            pixels[moment, c] = np.nan if points is None else points
+        first, image = seen_by[0]
+        names.append(sources[first].names[image])
     sizes = tuple(own[0].size for own in looks)
     views = Views(board, tuple(names), pixels, sizes)
     is_seen = np.any(views.found, axis=1)
@@ -297,15 +295,5 @@ class Capture:
     def views(self) -> Views:
         """The captured views."""
         names = tuple(str(number) for number in range(1, len(self.kept) + 1))
-        pixels = np.full((len(self.kept), 1, self.board.n_points, 2), np.nan)
-        for v, points in enumerate(self.kept):
-            pixels[v, 0] = points
+        pixels = np.array(self.kept).reshape(-1, 1, self.board.n_points, 2)
         return Views(self.board, names, pixels, (self.image_size,))
-
-
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Return the distance between two detections of a board, px rms."""
-    squares = np.square(one - other).sum(axis=-1)
-    if not np.isfinite(squares).any():
-        return np.inf
-    return float(np.sqrt(np.nanmean(squares)))

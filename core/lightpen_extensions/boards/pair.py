@@ -18,11 +18,13 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import Rig, of_camera, vector_from_rotation
 from lightpen_extensions.boards.adjustment import (
     FINEST,
+    N_POSE,
     N_SHAPE,
     BoardFit,
     BoardState,
     adjust_board,
     fit_board_poses,
+    places_at,
 )
 from lightpen_extensions.boards.calibration import (
     CameraCalibration,
@@ -157,8 +159,8 @@ def _covariance(fitted: BoardFit, scale_sigma: float) -> FloatArray:
     `lightpen_extensions.boards.effects`; then the intrinsics, as they move the place,
     and the scale of the board.
     """
-    cameras, first = fitted.state.cameras, fitted.of_places.start
-    n = fitted.of_places.stop - first
+    cameras, first = fitted.state.cameras, places_at(fitted.state.cameras).start
+    n = N_POSE
     information = fitted.information[:, first:, first:]
     variance = max(fitted.sigma, FINEST) ** 2
     C = np.linalg.inv(information.sum(axis=0) + variance * fitted.prior[first:, first:])

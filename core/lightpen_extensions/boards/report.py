@@ -10,7 +10,7 @@ from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
-from lightpen_extensions.boards.adjustment import BoardFit
+from lightpen_extensions.boards.adjustment import N_SHAPE, BoardFit
 from lightpen_extensions.boards.calibration import CameraCalibration
 from lightpen_extensions.boards.distortion import choice_record, map_uncertainty
 from lightpen_extensions.boards.observing import ObservedBoard, Views
@@ -35,16 +35,15 @@ def residuals_by_region(views: Views, residuals: FloatArray) -> dict[str, Any]:
     side. ``residuals`` (V, 1, N, 2) are NaN where a point was not seen.
     """
     seen = views.seen
-    share = views.pixels[seen] / np.array(views.image_sizes[0])
-    x, y = np.floor(share * np.array([COLUMNS, ROWS])).astype(np.int64).T
-    at = np.clip(y, 0, ROWS - 1) * COLUMNS + np.clip(x, 0, COLUMNS - 1)
-    left = residuals[seen]
+    (x, y), left = views.pixels[seen].T, residuals[seen]
+    width, height = views.image_sizes[0]
 
     def total(weights: FloatArray) -> FloatArray:
-        sums = np.bincount(at, weights, ROWS * COLUMNS).reshape(ROWS, COLUMNS)
-        return np.asarray(sums, dtype=np.float64)
+        inside = [[-0.5, height - 0.5], [-0.5, width - 0.5]]
+        sums, *_ = np.histogram2d(y, x, (ROWS, COLUMNS), inside, weights=weights)
+        return np.asarray(sums)
 
-    count = total(np.ones(len(at)))
+    count = total(np.ones(len(x)))
     with np.errstate(invalid="ignore"):
         rms = np.sqrt(total(np.square(left).sum(axis=-1)) / count)
         mean = np.stack([total(each) / count for each in left.T], axis=-1)
@@ -235,7 +234,7 @@ def _camera_record(camera: Camera) -> dict[str, Any]:
 
 
 def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
-    sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
+    sigmas = np.sqrt(np.diag(fitted.covariance)[-N_SHAPE:])
     return {
         name: {"value": value, "standard_uncertainty": sigma}
         for name, value, sigma in zip(

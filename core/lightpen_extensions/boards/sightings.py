@@ -14,6 +14,7 @@ References
    distinct points, corners and centres of circular features", ISPRS 1987.
 """
 
+from contextlib import nullcontext
 from functools import partial
 from itertools import product
 from threading import Lock
@@ -118,9 +119,9 @@ def _numbered(
     """
     if (board.columns + board.rows) % 2 == 0:
         return points
-    grid = points.reshape(board.rows, board.columns, 2)
-    is_first = is_first_dark(grey, grid)
-    return points if is_first else points[::-1]
+    shade = _samples(grey, points.reshape(board.rows, board.columns, 2)).mean(axis=0)
+    is_first_dark = np.sum(_turns(shade) * (shade - shade.mean())) < 0
+    return points if is_first_dark else points[::-1]
 
 
 def count_corners(image: Image) -> tuple[int, int] | None:
@@ -158,17 +159,14 @@ def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
 
 
 def _smaller(
-    grey: npt.NDArray[np.uint8], longer_side: int = SEARCHED
+    grey: npt.NDArray[np.uint8], longer_side: float = SEARCHED
 ) -> tuple[Any, float]:
     """Return an image to be searched, and its scale."""
     scale = min(1.0, longer_side / max(grey.shape))
-    return _shrunk(grey, scale), scale
-
-
-def _shrunk(grey: npt.NDArray[np.uint8], scale: float) -> Any:
-    if scale >= 1.0:
-        return grey
-    return cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    if scale == 1.0:
+        return grey, scale
+    small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return small, scale
 
 
 def _whole(points: Any, scale: float) -> FloatArray:
@@ -180,27 +178,21 @@ def _whole(points: Any, scale: float) -> FloatArray:
 def _chessboard(
     grey: npt.NDArray[np.uint8], corners: tuple[int, int], *, quick: bool
 ) -> FloatArray | None:
-    small, scale = _smaller(grey)
-    found, points = cv2.findChessboardCorners(small, corners, flags=QUICK)
-    if found and _is_board(small, points, corners):
-        return _whole(points, scale)
-    if quick:
-        return None
-    for flags in WAYS:
-        with _THOROUGHLY:
-            found, points = cv2.findChessboardCornersSB(small, corners, flags=flags)
+    plain, exact = cv2.findChessboardCorners, cv2.findChessboardCornersSB
+    ways: list[tuple[Any, int, int]] = [(plain, SEARCHED, QUICK)]
+    if not quick:
+        ways += [(exact, SEARCHED, flags) for flags in WAYS]
+        if max(grey.shape) <= SEARCHED or grey.size > SEARCHED_WHOLE:
+            ways.append((plain, SEARCHED_SMALL, QUICK & ~cv2.CALIB_CB_FAST_CHECK))
+        else:
+            ways.append((exact, max(grey.shape), THOROUGH))
+    for search, longer, flags in ways:
+        small, scale = _smaller(grey, longer)
+        with _THOROUGHLY if search is exact else nullcontext():
+            found, points = search(small, corners, flags=flags)
         if found and _is_board(small, points, corners):
             return _whole(points, scale)
-    if scale == 1.0 or grey.size > SEARCHED_WHOLE:
-        smallest, scale = _smaller(grey, SEARCHED_SMALL)
-        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        found, points = cv2.findChessboardCorners(smallest, corners, flags=flags)
-        is_found = found and _is_board(smallest, points, corners)
-        return _whole(points, scale) if is_found else None
-    with _THOROUGHLY:
-        found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
-    is_found = found and _is_board(grey, points, corners)
-    return _whole(points, 1.0) if is_found else None
+    return None
 
 
 def _is_board(
@@ -226,24 +218,18 @@ def _is_even(grid: FloatArray) -> bool:
 def _marked(
     grey: npt.NDArray[np.uint8], board: Board, *, quick: bool
 ) -> FloatArray | None:
-    shrunk = _shrunk(grey, (MARKED_WHOLE / grey.size) ** 0.5)
-    points = _by_markers(shrunk, board)
-    if shrunk is not grey:
-        return (
-            None if points is None else _whole(points, shrunk.shape[1] / grey.shape[1])
-        )
-    is_whole = points is not None and bool(np.isfinite(points).all())
-    if quick or is_whole or grey.size > ENLARGED:
+    small, scale = _smaller(grey, max(grey.shape) * (MARKED_WHOLE / grey.size) ** 0.5)
+    points = _by_markers(small, board)
+    if scale < 1.0:
+        return None if points is None else _whole(points, scale)
+    n_seen = 0 if points is None else int(np.isfinite(points[:, 0]).sum())
+    if quick or n_seen == board.n_points or grey.size > ENLARGED:
         return points
     larger = cv2.resize(grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
     again = _by_markers(np.asarray(larger, dtype=np.uint8), board)
-    if again is None or _n_seen(again) <= _n_seen(points):
+    if again is None or int(np.isfinite(again[:, 0]).sum()) <= n_seen:
         return points
     return _whole(again, 2.0)
-
-
-def _n_seen(points: FloatArray | None) -> int:
-    return 0 if points is None else int(np.isfinite(points[:, 0]).sum())
 
 
 def _by_markers(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
@@ -396,15 +382,6 @@ def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
     contrast, clear = np.concatenate(steps), np.concatenate(are_clear)
     telling = contrast > TELLING * contrast.max()
     return bool(clear[telling].mean() >= NEARLY_ALL)
-
-
-def is_first_dark(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
-    """Return whether the square beside the first corner is a dark one.
-
-    The parameters are as of `is_chequered`.
-    """
-    shade = _samples(grey, grid).mean(axis=0)
-    return bool(np.sum(_turns(shade) * (shade - shade.mean())) < 0)
 
 
 def _turns(shade: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import N_COEFFICIENTS
 from lightpen_extensions.boards.observing import Views
@@ -35,10 +35,6 @@ class BoardPoses(NamedTuple):
 
     rotations: FloatArray
     translations: FloatArray
-
-    def chosen(self, which: BoolArray) -> "BoardPoses":
-        """Return the poses of some views, (V,)."""
-        return BoardPoses(self.rotations[which], self.translations[which])
 
 
 def start_any_camera(views: Views) -> Camera:
@@ -112,15 +108,8 @@ def _start_pinhole(views: Views, n_coefficients: int) -> Camera:
     focal = USUAL_FOCAL_LENGTH
     if LONGEST**-2 < inverse_square < SHORTEST**-2:
         focal = inverse_square**-0.5
-    return Camera(
-        width,
-        height,
-        focal * longer,
-        focal * longer,
-        float(middle[0]),
-        float(middle[1]),
-        distortion=np.zeros(n_coefficients),
-    )
+    numbers = [focal * longer, focal * longer, *middle.tolist()]
+    return Camera(width, height, *numbers, distortion=np.zeros(n_coefficients))
 
 
 def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPoses:
