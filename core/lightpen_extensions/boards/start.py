@@ -108,8 +108,8 @@ def _start_pinhole(views: Views, n_coefficients: int) -> Camera:
     focal = USUAL_FOCAL_LENGTH
     if LONGEST**-2 < inverse_square < SHORTEST**-2:
         focal = inverse_square**-0.5
-    numbers = [focal * longer, focal * longer, *middle.tolist()]
-    return Camera(width, height, *numbers, distortion=np.zeros(n_coefficients))
+    f, (cx, cy) = focal * longer, middle.tolist()
+    return Camera(width, height, f, f, cx, cy, distortion=np.zeros(n_coefficients))
 
 
 def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPoses:
