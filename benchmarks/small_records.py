@@ -57,7 +57,6 @@ SMALL: Mapping[str, Any] = {
         "disc_diameter_mm": 10.0,
         "disc_diameter_by_areas_mm": None,
         "contradictions": [],
-        "image_fields": [],
     },
     "assumptions": {},
     "instrument": {

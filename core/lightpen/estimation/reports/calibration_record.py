@@ -12,7 +12,6 @@ from typing import Annotated, TypeAlias
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.own_json import (
@@ -166,23 +165,6 @@ class ContradictionRecord(Struct, frozen=True, omit_defaults=True):
     camera: str = ""
 
 
-class ImageFieldRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A shift of the images of a camera beside its model, which these support.
-
-    Attributes
-    ----------
-    size_px
-        Root mean square.
-    gain
-        Twice the logarithm of the likelihood ratio of this shift to none.
-    """
-
-    name: FieldName
-    camera: str = ""
-    size_px: Number
-    gain: Number
-
-
 class AdjustmentRecord(Struct, frozen=True):
     """The values of the files after the adjustment."""
 
@@ -192,7 +174,6 @@ class AdjustmentRecord(Struct, frozen=True):
     disc_diameter_mm: Number
     disc_diameter_by_areas_mm: Estimate | None
     contradictions: tuple[ContradictionRecord, ...]
-    image_fields: tuple[ImageFieldRecord, ...]
 
 
 class SelfCheckRecord(Struct, frozen=True):

@@ -23,7 +23,6 @@ from lightpen.estimation.reports.calibration_record import (
     Estimate,
     FrameRecord,
     ImageCounts,
-    ImageFieldRecord,
     InputsRecord,
     InstrumentRecord,
     LedRecord,
@@ -207,15 +206,6 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
                 camera=each.camera,
             )
             for each in calibration.contradictions
-        ),
-        image_fields=tuple(
-            ImageFieldRecord(
-                name=each.name,
-                camera=each.camera,
-                size_px=plain(each.size),
-                gain=plain(each.gain),
-            )
-            for each in calibration.fields
         ),
     )
 

@@ -24,8 +24,9 @@ Each is the error of the effective tip (`Bundle.effective`), in the scale of the
 file: scale and temperature of the pen act when the tip measures.
 
 Sizes of random effects are estimated from the images. One that is not significant is
-not fitted, but budgeted by its expected variance, equation (6). U = 2 sqrt(diag C) with
-the sum C, equation (21).
+not fitted, but budgeted by its expected variance, equation (6). Fields of the images
+are averages over their sizes, equation (7). U = 2 sqrt(diag C) with the sum C, equation
+(21).
 
 Residuals of successive images are correlated. The factor on the noise follows from the
 autoregression (`noise_correlation`), or from the scatter between blocks of consecutive
