@@ -211,10 +211,14 @@ class ReviewPage(Page):
     def _refresh(self) -> None:
         """Show the current state."""
         self._view.tabs.fill()
-        self._retranslate()
+        self._show_state()
 
     @override
     def _retranslate(self) -> None:
+        self._show_state()
+        self._show_bending()
+
+    def _show_state(self) -> None:
         names = self._selection.preparation.names
         state = review_page_state(self._run.status, names, self.main_action())
         self._view.set_state(state)
@@ -222,13 +226,13 @@ class ReviewPage(Page):
             self._methods.set_locked(state.why_locked)
 
     def _on_images_made(self, images: "ImagesPanel") -> None:
-        self._retranslate()
+        self._show_state()
         images.exclude_requested.connect(self._exclude)
         images.include_requested.connect(self._include)
 
     def _on_methods_made(self, methods: "MethodsPanel") -> None:
         self._methods = methods
-        self._retranslate()
+        self._show_state()
         methods.method_chosen.connect(self._report_by)
 
     def _report_by(self, method: Method) -> None:

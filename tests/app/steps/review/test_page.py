@@ -59,6 +59,7 @@ from lightpen.swing.swing_recorder import (
     record_header,
     recorded_setup,
 )
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
@@ -472,6 +473,18 @@ def test_a_good_swing_passes_with_its_reason_and_the_next_step(
     assert page.lead().startswith("Next: accept the tip.")
     assert page.why_closed() == ""
     assert page.main_action() == MainAction("Accept", at_screen=True)
+
+
+def test_every_remark_on_the_result_follows_the_language(
+    page: ReviewPage, qtbot: QtBot, qapp: QApplication
+) -> None:
+    before = [label.value().text for label in page.findChildren(SignLabel)]
+    LanguageSwitch(qapp).set_language("zh_CN")
+    qtbot.wait(20)
+    after = [label.value().text for label in page.findChildren(SignLabel)]
+
+    assert any(text.startswith("Bending") for text in before)
+    assert [text for text in after if text.isascii() and text] == []
 
 
 def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
