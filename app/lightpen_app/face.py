@@ -165,7 +165,7 @@ class BudgetRow(QWidget):
 class PressComparison(QObject):
     """Compares a swing with firm pressure with the light one; this one cannot."""
 
-    compared = Signal(object)  # StatusMessage on the bending
+    compared = Signal(object)  # Callable[[], StatusMessage]: words on the bending
 
     is_here = False
 

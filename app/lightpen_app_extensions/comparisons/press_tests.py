@@ -63,9 +63,10 @@ class PressTests(PressComparison):
         self._job.cancel()
 
     def _on_compared(self, found: "PressTest") -> None:
-        text = " ".join(map(worded, found.words))
         mark = GRADE_MARKS[found.assessment.grade]
-        self.compared.emit(StatusMessage(text, *mark))
+        self.compared.emit(
+            lambda: StatusMessage(" ".join(map(worded, found.words)), *mark)
+        )
         status, now = self._workbench.run.status, self._workbench.around.now()
         measured, names = found.bending(now.date()), status.names
         if measured is None or status.origin is Origin.SIMULATED or not names.tip:

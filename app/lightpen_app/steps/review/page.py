@@ -206,19 +206,16 @@ class ReviewPage(Page):
     def _show_bending(self) -> None:
         """Show the bending that counts for the tip of the swing."""
         library, today = self._library.library, self._now().date()
-        self._view.result.set_bending(bending_message(self._run.status, library, today))
+        words = partial(bending_message, self._run.status, library, today)
+        self._view.result.set_bending(words)
 
     def _refresh(self) -> None:
         """Show the current state."""
         self._view.tabs.fill()
-        self._show_state()
+        self._retranslate()
 
     @override
     def _retranslate(self) -> None:
-        self._show_state()
-        self._show_bending()
-
-    def _show_state(self) -> None:
         names = self._selection.preparation.names
         state = review_page_state(self._run.status, names, self.main_action())
         self._view.set_state(state)
@@ -226,13 +223,13 @@ class ReviewPage(Page):
             self._methods.set_locked(state.why_locked)
 
     def _on_images_made(self, images: "ImagesPanel") -> None:
-        self._show_state()
+        self._retranslate()
         images.exclude_requested.connect(self._exclude)
         images.include_requested.connect(self._include)
 
     def _on_methods_made(self, methods: "MethodsPanel") -> None:
         self._methods = methods
-        self._show_state()
+        self._retranslate()
         methods.method_chosen.connect(self._report_by)
 
     def _report_by(self, method: Method) -> None:

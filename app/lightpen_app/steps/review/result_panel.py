@@ -1,6 +1,6 @@
 """The result of a swing: the tip, its uncertainty, and the change."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 
@@ -212,6 +212,7 @@ class ResultPanel(Translated, QFrame):
         self._halves = SignLabel()
         self._self_check = SignLabel()
         self._bending = SignLabel()
+        self._bending_words: Callable[[], StatusMessage] = StatusMessage
         self._images = SignLabel()
 
         # Layout
@@ -233,17 +234,17 @@ class ResultPanel(Translated, QFrame):
         self._value = value
         self._refresh()
 
-    def set_bending(self, message: StatusMessage) -> None:
+    def set_bending(self, words: Callable[[], StatusMessage]) -> None:
         """Show the bending that counts for the tip, or the press test just made."""
-        self._bending.set_value(message)
-        self._bending.setVisible(self._value is not None)
+        self._bending_words = words
+        self._refresh()
 
     def _retranslate(self) -> None:
         self._refresh()
 
     def _refresh(self) -> None:
         outcome = self._value
-        self._bending.setVisible(outcome is not None)
+        self._bending.set_value(self._bending_words() if outcome else StatusMessage())
         if outcome is None:
             self._comparison.set_value(Figures())
             self._as_found.set_value(StatusMessage())
