@@ -17,6 +17,7 @@ import lightpen.cameras.protocol  # its errors are children of the core's
 import lightpen_app
 import lightpen_app_extensions
 import lightpen_extensions
+import lightpen_extensions.stream.server  # as are these
 from lightpen.catalogue import cameras, command_line, estimation, files, record
 from lightpen.cli import ADVICE
 from lightpen.errors import FileError, LightpenError
