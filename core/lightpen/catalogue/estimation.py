@@ -138,5 +138,4 @@ MESSAGES = {
     "limit.repeatability": "Repeatability: std. deviation of the tip",
     "limit.drift": "Motion of drift reference",
     "limit.max-days": "Tip: calibration interval (days)",
-    "limit.max-swings": "Tip: max. swings of the pen",
 }

@@ -14,7 +14,7 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import Decision, DecisionRule, decide
 
 IMAGES = LEAST_IMAGES, MOST_IMAGES = 10, 2000
-MOST_DAYS, MOST_SWINGS = 3650, 10_000
+MOST_DAYS = 3650
 SMALLEST = 1e-12  # mm, above 0
 
 
@@ -153,11 +153,9 @@ class DueRule:
 
     # Days since it was calibrated.
     max_days: int = _limit(30, message("limit.max-days"), "", (1, MOST_DAYS))
-    # Swings of its pen since, with any tip: changing tips wears the seat; 0: no limit.
-    max_swings: int = _limit(0, message("limit.max-swings"), "", (0, MOST_SWINGS))
 
     def __post_init__(self) -> None:
-        if self.max_days < 1 or self.max_swings < 0:
+        if self.max_days < 1:
             raise ValueError(f"No tip can be due by {self}.")
 
     def due(self, accepted: datetime) -> datetime:

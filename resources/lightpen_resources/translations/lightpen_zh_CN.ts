@@ -54,7 +54,7 @@
     </message>
     <message>
         <source>Save listed entries (CSV)...</source>
-        <translation>保存所列条目(CSV)...</translation>
+        <translation>保存所列条目 (CSV)...</translation>
     </message>
     <message>
         <source>For other programs</source>
@@ -781,10 +781,6 @@
 <context>
     <name>DuePanel</name>
     <message>
-        <source>No limit</source>
-        <translation>无限值</translation>
-    </message>
-    <message>
         <source>{0} of {1} tips in use at this station are due.</source>
         <translation>本工位使用中的 {1} 个测头中，{0} 个已到期。</translation>
     </message>
@@ -799,14 +795,6 @@
     <message>
         <source>Due</source>
         <translation>到期</translation>
-    </message>
-    <message>
-        <source>Swings since</source>
-        <translation>此后摆动次数</translation>
-    </message>
-    <message>
-        <source>Swings left</source>
-        <translation>剩余摆动次数</translation>
     </message>
     <message>
         <source>State</source>
@@ -1591,10 +1579,6 @@
     <message>
         <source>Calibration interval (days)</source>
         <translation>标定周期（天）</translation>
-    </message>
-    <message>
-        <source>Max. swings of the pen</source>
-        <translation>光笔最多摆动次数</translation>
     </message>
     <message>
         <source>Nominal tip centre</source>
@@ -5780,10 +5764,6 @@
         <translation>测头：标定周期（天）</translation>
     </message>
     <message>
-        <source>Tip: max. swings of the pen</source>
-        <translation>测头：光笔最多摆动次数</translation>
-    </message>
-    <message>
         <source>Too many levels of symbolic links</source>
         <translation>符号链接的层数过多</translation>
     </message>
@@ -8681,10 +8661,6 @@
     <message>
         <source>calibration interval {0} days</source>
         <translation>标定周期 {0} 天</translation>
-    </message>
-    <message>
-        <source>max. {0} swings</source>
-        <translation>最多摆动 {0} 次</translation>
     </message>
     <message>
         <source>camera {0}</source>

@@ -145,33 +145,19 @@ def test_what_concerns_an_entry_is_found_in_its_order(station: Station) -> None:
     assert messages_on(station.database, second) == ()
 
 
-def test_a_tip_is_due_by_its_age_or_by_the_swings_of_its_pen(station: Station) -> None:
+def test_a_tip_is_due_by_its_age(station: Station) -> None:
     station.enter(1)
-    for n in range(1, 4):
-        swing = accepted(n, tip="T-11")[0]
-        other = structs.replace(swing, kind=Kind.REFUSED, swing=f"swing-{n}")
-        enter(station, other)
-    practice = accepted(4, tip="T-11")[0]
-    enter(station, structs.replace(practice, origin=Origin.SIMULATED))
-    (tip,) = due_tips(station.database, station.chain, DueRule(30, 4))
-    assert (tip.n_swings, tip.n_left) == (3, 1)
+    (tip,) = due_tips(station.database, station.chain, DueRule(30))
     assert tip.due == NOON + timedelta(days=30)
     assert not tip.is_due(tip.due)
     assert tip.is_due(tip.due + timedelta(seconds=1))
 
-    (worn,) = due_tips(station.database, station.chain, DueRule(30, 3))
-    assert worn.is_due(NOON)
-    (lasting,) = due_tips(station.database, station.chain, DueRule(30, 0))
-    assert lasting.n_left is None
 
-
-def test_a_tip_that_is_due_is_listed_before_one_that_is_not(station: Station) -> None:
+def test_the_tip_that_is_due_first_is_listed_first(station: Station) -> None:
     station.enter(1)
     enter(station, accepted(9, tip="T-11")[0])
-    swing = structs.replace(accepted(10, tip="T-9")[0], kind=Kind.ABANDONED)
-    enter(station, swing)
 
-    listed = due_tips(station.database, station.chain, DueRule(30, 2))
+    listed = due_tips(station.database, station.chain, DueRule(30))
     assert [tip.entry.entry.event.names.tip for tip in listed] == ["T-10", "T-11"]
 
 

@@ -30,7 +30,7 @@ from lightpen.record.library.tip_library import (
 from lightpen_extensions.plant.copies import entries_of
 
 ANN = Author("Hall 2", "Ann", "bought in May")
-RULE = DueRule(30, 0)
+RULE = DueRule(30)
 
 
 @pytest.fixture

@@ -185,13 +185,7 @@ class DuePanel(Translated, QWidget):
             else self.tr("No tip is in use at this station.")
         )
         self._table.setVisible(bool(self._tips))
-        columns = (
-            self.tr("Calibrated"),
-            self.tr("Due"),
-            self.tr("Swings since"),
-            self.tr("Swings left"),
-            self.tr("State"),
-        )
+        columns = (self.tr("Calibrated"), self.tr("Due"), self.tr("State"))
         rows = tuple(map(_name, self._tips))
         cells = tuple(self._cells(tip, now) for tip in self._tips)
         self._table.set_value(Figures(columns, rows, cells))
@@ -200,8 +194,6 @@ class DuePanel(Translated, QWidget):
         days = (tip.calibrated, tip.due)
         return (
             *(day_text(day) for day in days),
-            f"{tip.n_swings}",
-            self.tr("No limit") if tip.n_left is None else f"{max(0, tip.n_left)}",
             self.tr("DUE") if tip.is_due(now) else self.tr("valid"),
         )
 

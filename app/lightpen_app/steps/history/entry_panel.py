@@ -67,7 +67,6 @@ _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "bending": QT_TRANSLATE_NOOP("history", "bending and U {0} mm"),
     "max_change_mm": QT_TRANSLATE_NOOP("history", "max. change {0} mm"),
     "max_days": QT_TRANSLATE_NOOP("history", "calibration interval {0} days"),
-    "max_swings": QT_TRANSLATE_NOOP("history", "max. {0} swings"),
     "note": "{0}",
     "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
 }

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QWidget
 
 from lightpen.local_time import local_now
 from lightpen.model.artefacts import KIND_WORDS, SIDES, ArtefactKind, Side
-from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
+from lightpen.model.limits import MOST_DAYS
 from lightpen.record.library.tip_library import (
     LARGEST_BALL,
     LARGEST_CHANGE,
@@ -58,10 +58,9 @@ class ItemForm(Translated, QWidget):
             ),
         )
         self._days = NumberField("", (0, MOST_DAYS), 0)
-        self._swings = NumberField("", (0, MOST_SWINGS), 0)
         self._nominal = PointField()
         self._note = QLineEdit(maxLength=LONGEST_NOTE)
-        own = (self._ball, self._change, self._days, self._swings)
+        own = (self._ball, self._change, self._days)
         of_reference = self._value, self._shape, self._uncertainty, self._side
         nothing, no_limit = self.tr("Not specified"), self.tr("No limit")
         usual = self.tr("As for the station")
@@ -77,7 +76,6 @@ class ItemForm(Translated, QWidget):
             (self._ball, self.tr("Ball diameter"), nothing),
             (self._change, self.tr("Max. change since last calibration"), no_limit),
             (self._days, self.tr("Calibration interval (days)"), usual),
-            (self._swings, self.tr("Max. swings of the pen"), usual),
             (self._nominal, self.tr("Nominal tip centre"), ""),
             (self._note, self.tr("Comment"), ""),
         )
@@ -121,7 +119,7 @@ class ItemForm(Translated, QWidget):
 
     def value(self) -> AnyItem:
         """Return the item in the form."""
-        for field in (self._ball, self._change, self._days, self._swings):
+        for field in (self._ball, self._change, self._days):
             field.settle()
         self._nominal.settle()
         item = structs.replace(
@@ -151,7 +149,6 @@ class ItemForm(Translated, QWidget):
             ball_diameter_mm=self._ball.value() or None,
             max_change_mm=self._change.value() or None,
             max_days=round(self._days.value()) or None,
-            max_swings=round(self._swings.value()) or None,
             nominal_tip_mm=None if nominal is None else tuple(nominal.tolist()),
         )
 
@@ -176,7 +173,6 @@ class ItemForm(Translated, QWidget):
             self._ball.set_value(item.ball_diameter_mm or 0.0)
             self._change.set_value(item.max_change_mm or 0.0)
             self._days.set_value(item.max_days or 0)
-            self._swings.set_value(item.max_swings or 0)
             self._nominal.set_value(item.nominal_tip)
         self._retranslate()
 

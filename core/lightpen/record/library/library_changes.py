@@ -11,7 +11,7 @@ from msgspec import structs
 from lightpen.errors import NameTakenError, UsageError
 from lightpen.formats.own_json import FORMAT, json_bytes, with_checksum
 from lightpen.messages import Message, message, printable
-from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
+from lightpen.model.limits import MOST_DAYS
 from lightpen.record.library.entered_files import (
     make_folder,
     newest_number,
@@ -143,9 +143,8 @@ def _sensible_tip(tip: ListedTip) -> ListedTip:
         raise UsageError("library.absurd-ball", diameter=ball, most=LARGEST_BALL)
     if change is not None and not 0 < change <= LARGEST_CHANGE:
         raise UsageError("library.absurd-change", limit=change, most=LARGEST_CHANGE)
-    for count, most in ((tip.max_days, MOST_DAYS), (tip.max_swings, MOST_SWINGS)):
-        if count is not None and not 1 <= count <= most:
-            raise UsageError("library.absurd-count", count=count, most=most)
+    if tip.max_days is not None and not 1 <= tip.max_days <= MOST_DAYS:
+        raise UsageError("library.absurd-count", count=tip.max_days, most=MOST_DAYS)
     nominal = tip.nominal_tip_mm
     if nominal is not None and not np.abs(nominal).max() <= LARGEST_PLACE:
         raise UsageError(

@@ -36,7 +36,7 @@ from lightpen.local_time import local_time
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Artefact, ArtefactKind, Side
 from lightpen.model.bending import Bending, MeasuredBending, bending_on
-from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
+from lightpen.model.limits import MOST_DAYS, DueRule
 from lightpen.model.names import folded_name, same_name
 from lightpen.record.library.entered_files import entered_files, numbered_files
 from lightpen.record.library.supervision import read_supervision
@@ -161,7 +161,6 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     max_change_mm: Annotated[float, Meta(gt=0, le=LARGEST_CHANGE)] | None = None
     # `DueRule` of its own; None: the station's
     max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
-    max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
     bending: MeasuredBending | None = None  # by its last press test
 
     @property
@@ -172,9 +171,7 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
 
     def rule(self, usual: DueRule) -> DueRule:
         """Return the calibration interval, its own or the default."""
-        return DueRule(
-            self.max_days or usual.max_days, self.max_swings or usual.max_swings
-        )
+        return DueRule(self.max_days or usual.max_days)
 
 
 AnyItem: TypeAlias = ListedPen | ListedTip | ListedCone | ListedCamera | ListedReference
@@ -379,7 +376,7 @@ class StationStatus:
             or not is_over
             or due > self._today(self.now)
         ):
-            return None  # due by the number of swings, or by a clock that was set back
+            return None  # due by a clock that was set back
         return message("doubt.calibration-overdue", due=f"{due:%Y-%m-%d}")
 
     def of_item(self, kind: ItemKind, name: str) -> TipStatus | None:

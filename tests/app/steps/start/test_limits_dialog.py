@@ -26,7 +26,7 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.workbench import Workbench
 
 TIGHT = StationLimits(
-    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7, 50))
+    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7))
 )
 
 

@@ -27,7 +27,7 @@ NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 SECRET = "correct horse"
 EVE = Signature("Eve", SECRET)
 TIGHT = StationLimits(
-    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7, 50))
+    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7))
 )
 
 

@@ -95,7 +95,7 @@ def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> N
         ({"ball_diameter_mm": float("nan")}, "Ball diameter nan mm is not valid"),
         ({"max_change_mm": -0.1}, "Max. change -0.1 mm"),
         ({"max_days": 0}, "0 is not valid"),
-        ({"max_swings": 10**6}, "1000000 is not valid"),
+        ({"max_days": 10**6}, "1000000 is not valid"),
         ({"nominal_tip_mm": (0.0, float("inf"), 0.0)}, "The nominal centre"),
         ({"id": "  "}, "is not a valid ID"),
         ({"id": "T\n1"}, "is not a valid ID"),
@@ -116,10 +116,10 @@ def test_a_tip_that_is_not_there_cannot_be_changed(tmp_path: Path) -> None:
 
 
 def test_a_tip_has_a_rule_of_its_own_or_that_of_the_station() -> None:
-    usual, own = DueRule(30, 0), ListedTip(id="T", max_days=7)
+    usual, own = DueRule(30), ListedTip(id="T", max_days=7)
 
     library = Library(tips={"T": own})
-    assert library.rule_of("T", usual) == DueRule(7, 0)
+    assert library.rule_of("T", usual) == DueRule(7)
     assert library.rule_of("T-10", usual) == usual
 
 
