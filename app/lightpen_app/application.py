@@ -24,7 +24,7 @@ from lightpen_app.crash import CrashHook, versions
 from lightpen_app.face import Service
 from lightpen_app.faced import Face
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
+from lightpen_app.look.sounds import Sounds, find_sounds
 from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.shell.sidebar import subject_of
@@ -150,9 +150,8 @@ class Wizard(QObject):
         self._languages = LanguageSwitch(application)
         self._languages.set_language(self._preferences.language)
         load_fonts()
-        self._sounds = MutedSounds(
-            find_sounds(folder / "sounds"), muted=self._preferences.muted
-        )
+        self._sounds = find_sounds(folder / "sounds")
+        self._sounds.muted = self._preferences.muted
         self.workbench = Workbench(settings, folder, around, self)
         self.services = tuple(make(self.workbench) for make in faces)
         pages = iter(make_pages(self.workbench, self._sounds, self.services))

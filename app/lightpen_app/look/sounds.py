@@ -1,7 +1,7 @@
 """Sounds that accompany the swing; each also has a picture and a word.
 
 The program runs without any: what plays them is looked for when it starts, and if
-there is nothing, `SilentSounds` takes its place; the log says so.
+there is nothing, the log says so.
 """
 
 import io
@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from PySide6.QtCore import QProcess
@@ -50,32 +49,23 @@ TONES: dict[Sound, tuple[tuple[float, float], ...]] = {
 KEPT_STEPS = 12  # the tick rises by an octave in so many steps
 
 
-class Sounds(Protocol):
-    """Protocol of a player of sounds."""
+class Sounds:
+    """Plays sounds from WAV files, which are written to a folder when first needed.
+
+    Without a function that plays files, and while it is muted, it plays nothing.
+    """
+
+    def __init__(
+        self, folder: Path, play_file: Callable[[Path], object] | None = None
+    ) -> None:
+        self._folder = folder
+        self._play_file = play_file
+        self.muted = False
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         """Begin to play and return at once; KEPT rises with progress, 0 to 1."""
-
-
-class SilentSounds:
-    """Plays nothing."""
-
-    def play(self, sound: Sound, progress: float = 0.0) -> None:
-        """No-op."""
-
-
-class FileSounds:
-    """Plays sounds from WAV files.
-
-    The files are written to the folder when first needed.
-    """
-
-    def __init__(self, folder: Path, play_file: Callable[[Path], None]) -> None:
-        self._folder = folder
-        self._play_file = play_file
-
-    def play(self, sound: Sound, progress: float = 0.0) -> None:
-        """Begin to play a sound."""
+        if self.muted or self._play_file is None:
+            return
         step = round(KEPT_STEPS * min(max(progress, 0.0), 1.0))
         step = step if sound is Sound.KEPT else 0
         path = self._folder / f"{sound}-{step}.wav"
@@ -88,30 +78,17 @@ class FileSounds:
         self._play_file(path)
 
 
-class MutedSounds:
-    """Forwards sounds unless muted."""
-
-    def __init__(self, sounds: Sounds, *, muted: bool = False) -> None:
-        self._sounds = sounds
-        self.muted = muted
-
-    def play(self, sound: Sound, progress: float = 0.0) -> None:
-        """Begin to play a sound, unless muted."""
-        if not self.muted:
-            self._sounds.play(sound, progress)
-
-
 def find_sounds(folder: Path) -> Sounds:
     """Return the player of this system; sound files are written to a folder."""
     if sys.platform == "win32":
-        return FileSounds(folder, _play_on_windows)
+        return Sounds(folder, _play_on_windows)
     for program, *options in PLAYERS:
         path = shutil.which(program)
         if path is not None:
-            return FileSounds(folder, _player(path, options))
+            return Sounds(folder, _player(path, options))
     programs = ", ".join(program for program, *_ in PLAYERS)
     _logger.warning("There are no sounds: none of %s is installed.", programs)
-    return SilentSounds()
+    return Sounds(folder)
 
 
 def sound_wav(sound: Sound, step: int = 0) -> bytes:

@@ -1,17 +1,12 @@
 """What all figures have in common."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from PySide6.QtCore import QEvent, QSize
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen.arrays import FloatArray
 from lightpen_app.widgets.fields import anew
-
-Column: TypeAlias = FloatArray | tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -24,11 +19,10 @@ class Axes:
 
 
 class Figure(QWidget):
-    """Base of the figures: their words and numbers."""
+    """Base of the figures: their words and sizes."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._columns: dict[str, Column] = {}
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def set_axes(self, axes: Axes) -> None:
@@ -43,10 +37,6 @@ class Figure(QWidget):
         if event.type() == QEvent.Type.LanguageChange:
             now = self._axes
             self.set_axes(Axes(anew(now.title), anew(now.x), anew(now.y)))
-
-    def columns(self) -> Mapping[str, Column]:
-        """Return the displayed data by name."""
-        return self._columns
 
     @override
     def sizeHint(self) -> QSize:

@@ -1,11 +1,10 @@
-"""Plots with replaceable data, which can be saved as PNG and CSV.
+"""Plots with replaceable data.
 
 Making a plot again costs fifty times more than `setData` on one that is there.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import TypeAlias
 
@@ -132,7 +131,7 @@ pg.setConfigOptions(antialias=True)
 
 
 class Plot(Figure):
-    """Base of the plots: its frame, its colours, and how it is saved.
+    """Base of the plots: its frame and its colours.
 
     The mouse moves nothing: a plot always shows all of its data.
     """
@@ -284,21 +283,13 @@ def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:
     return "&nbsp; ".join((escape(title), *words))
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A curve: its CSV column and its name beside the title."""
-
-    column: str
-    name: str = ""
-
-
 class TracePlot(Plot):
     """Values over the number of the image, with a limit to compare them with.
 
     Parameters
     ----------
-    curves : sequence of Curve
-        Curves; names are shown in their colours if there are several.
+    names : sequence of str
+        Names of the curves, shown in their colours if there are several.
     y_zero : bool
         Always show the zero.
     y_log : bool
@@ -310,30 +301,31 @@ class TracePlot(Plot):
     def __init__(
         self,
         axes: Axes,
-        curves: Sequence[Curve],
+        names: Sequence[str] = ("",),
         *,
         y_zero: bool = False,
         y_log: bool = False,
         is_robust: bool = False,
     ) -> None:
-        self.has_symbols = len(curves) == len(SYMBOLS)
+        self.has_symbols = len(names) == len(SYMBOLS)
         self._curves: list[pg.PlotCurveItem] = []
         self._marks: list[pg.ScatterPlotItem] = []
         self._legend: tuple[str, ...] = ()
         self._limit: pg.InfiniteLine | None = None
         super().__init__(axes)
-        self._names = tuple(curve.column for curve in curves)
+        self._x: FloatArray = np.zeros(0)
+        self._values: tuple[FloatArray, ...] = ()
         self._y_zero = y_zero
         self._y_log = y_log
         self._is_robust = is_robust
         self._limit_at: float | None = None
-        self._legend = tuple(curve.name for curve in curves)
+        self._legend = tuple(names)
         left = self._item.getAxis("left")
         left.setLogMode(y_log)
         left.setWidth(LEFT_WIDTH)
         self._item.layout.setContentsMargins(0, 0, 2 * GRID, 0)
         self._show_nothing()
-        for _ in curves:
+        for _ in names:
             self._curves.append(pg.PlotCurveItem())
         if self.has_symbols:
             self._marks = [
@@ -355,7 +347,7 @@ class TracePlot(Plot):
 
     def set_data(self, x: FloatArray, *values: FloatArray) -> None:
         """Show values (N,) of each curve over x (N,); NaN leaves a gap."""
-        self._columns = {"image": x, **dict(zip(self._names, values, strict=True))}
+        self._x, self._values = x, values
         heights = [self._height(value) for value in values]
         for curve, height in zip(self._curves, heights, strict=True):
             curve.setData(x, height, connect="finite")
@@ -372,17 +364,17 @@ class TracePlot(Plot):
         self._limit.setVisible(value is not None)
         if value is not None:
             self._limit.setValue(float(self._height(np.array([value]))[0]))
-        if not len(next(iter(self._columns.values()), ())):
+        if not len(self._x):
             self._show_nothing()
 
     def _show_range(self) -> None:
         """Set the range to show all that is required."""
-        x, *values = map(np.asarray, self._columns.values())
+        x = self._x
         if not len(x):
             self._show_nothing()
             return
         self._show_numbers(True)
-        in_sight = [self._height(value) for value in values]
+        in_sight = [self._height(value) for value in self._values]
         if self._is_robust:
             in_sight = list(map(_without_outliers, in_sight))
         if self._limit_at is not None:

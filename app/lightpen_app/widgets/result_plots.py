@@ -20,8 +20,8 @@ from lightpen_app.look.figures import (
     paint_budget,
 )
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
-from lightpen_app.widgets.figure import Axes, Column, Figure
-from lightpen_app.widgets.plots import SYMBOL, SYMBOLS, TONES, Curve, Plot
+from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.plots import SYMBOL, SYMBOLS, TONES, Plot
 
 HEAD = 4 * GRID  # px, above the bars of a budget
 GROUP = 0.8  # of the room for a label, that its bars fill
@@ -64,7 +64,7 @@ class ArrowPlot(SquarePlot):
     """Residuals as enlarged arrows over the image, where they should look random.
 
     Of many arrows, the means in cells of the image are drawn: a pattern stands out of
-    the noise then. The CSV file holds them all.
+    the noise then.
     """
 
     def __init__(self, axes: Axes) -> None:
@@ -103,12 +103,6 @@ class ArrowPlot(SquarePlot):
         self._shafts.setData(*arrow_lines(starts, vectors * self._scale))
         self._frame.setRect(frame)
         self.set_range(shown)
-        self._columns = {
-            "x_px": points[:, 0],
-            "y_px": points[:, 1],
-            "residual_x_px": residuals[:, 0],
-            "residual_y_px": residuals[:, 1],
-        }
 
     def mark(self, points: FloatArray) -> None:
         """Show dots at points (N, 2)."""
@@ -145,9 +139,8 @@ def _around(points: FloatArray) -> QRectF:
 class NamedPlot(Plot):
     """A plot of one or more series; several are named beside the title."""
 
-    def __init__(self, axes: Axes, series: Sequence[Curve]) -> None:
-        self._columns_of_series = tuple(each.column for each in series)
-        self._names = tuple(each.name for each in series)
+    def __init__(self, axes: Axes, names: Sequence[str]) -> None:
+        self._names = tuple(names)
         super().__init__(axes)
 
     def names(self) -> tuple[str, ...]:
@@ -163,22 +156,14 @@ class NamedPlot(Plot):
     def _named_curves(self) -> tuple[str, ...]:
         return self._names if len(self._names) > 1 else ()
 
-    def _named(self, *values: FloatArray) -> dict[str, Column]:
-        """Return the values of each series by its column."""
-        return dict(zip(self._columns_of_series, values, strict=True))
-
 
 class BarPlot(NamedPlot):
-    """A group of bars for each label, one bar a series, in their order.
+    """A group of bars for each label, one bar a series, in their order."""
 
-    ``label_column`` is the column of labels in the CSV file.
-    """
-
-    def __init__(self, axes: Axes, series: Sequence[Curve], label_column: str) -> None:
+    def __init__(self, axes: Axes, names: Sequence[str]) -> None:
         self._bars: list[pg.BarGraphItem] = []
-        super().__init__(axes, series)
-        self._label_column = label_column
-        for _ in series:
+        super().__init__(axes, names)
+        for _ in names:
             bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
             self._item.addItem(bars)
             self._bars.append(bars)
@@ -195,7 +180,6 @@ class BarPlot(NamedPlot):
                 x=places + offset, height=np.nan_to_num(value), width=0.9 * width
             )
         self._item.getAxis("bottom").setTicks([list(enumerate(labels))])
-        self._columns = {self._label_column: tuple(labels), **self._named(*values)}
         edges = np.array([-0.5, len(labels) - 0.5])
         self._fit(edges, np.concatenate(values), y_zero=True)
 
@@ -212,10 +196,10 @@ class MarkPlot(NamedPlot):
 
     has_symbols = True
 
-    def __init__(self, axes: Axes, curves: Sequence[Curve]) -> None:
+    def __init__(self, axes: Axes, names: Sequence[str]) -> None:
         self._curves: list[pg.PlotDataItem] = []
-        super().__init__(axes, curves)
-        for _, symbol in zip(curves, SYMBOLS, strict=False):
+        super().__init__(axes, names)
+        for _, symbol in zip(names, SYMBOLS, strict=False):
             curve = pg.PlotDataItem(pen=None, symbol=symbol, symbolSize=SYMBOL)
             self._item.addItem(curve)
             self._curves.append(curve)
@@ -226,7 +210,6 @@ class MarkPlot(NamedPlot):
         for curve, value in zip(self._curves, values, strict=True):
             known = np.isfinite(value)
             curve.setData(x[known], value[known])
-        self._columns = {"number": x, **self._named(*values)}
         self._fit(x, np.concatenate(values))
 
     @override
@@ -261,12 +244,6 @@ class PosturePlot(SquarePlot):
         degrees = np.degrees(tilts)
         right, away = degrees * np.cos(directions), degrees * np.sin(directions)
         self._dots.setData(right, away)
-        self._columns = {
-            "tilt_deg": degrees,
-            "direction_deg": np.degrees(directions),
-            "right_deg": right,
-            "away_deg": away,
-        }
         reach = float(np.max(degrees, initial=FARTHEST))
         self.set_range(QRectF(-reach, -reach, 2 * reach, 2 * reach))
 
@@ -310,11 +287,6 @@ class BudgetPlot(Figure):
         self._value = value
         line = QFontMetricsF(font(TextSize.SMALL)).height()
         self.setMinimumHeight(HEAD + round((len(value.bars) + 1) * line) + 2 * GRID)
-        self._columns = {
-            "part": tuple(bar.name for bar in value.bars),
-            "expanded_uncertainty_mm": np.array([bar.value for bar in value.bars]),
-            "assumed": tuple(str(bar.assumed).lower() for bar in value.bars),
-        }
         self.update()
 
     @override

@@ -26,6 +26,7 @@ class TrendPlot(Plot):
 
     def __init__(self, axes: Axes) -> None:
         self._dots: pg.ScatterPlotItem | None = None
+        self._values: FloatArray = np.zeros(0)
         super().__init__(axes)
         self._bars = pg.ErrorBarItem(x=np.zeros(0), y=np.zeros(0), height=np.zeros(0))
         self._line = pg.PlotCurveItem()
@@ -51,15 +52,13 @@ class TrendPlot(Plot):
             line.setVisible(i < len(limits))
             if i < len(limits):
                 line.setValue(float(limits[i]))
-        self._columns = {"calibration": x, "value_mm": values}
-        if uncertainty is not None:
-            self._columns["expanded_uncertainty_mm"] = uncertainty
+        self._values = values
         seen = np.concatenate((values - bars, values + bars, limits))
         self._fit_numbered(len(x), seen)
 
     def mark(self, number: int | None) -> None:
         """Put a ring about the dot of a calibration, counted from 1, or about none."""
-        values = self._columns.get("value_mm", np.zeros(0))
+        values = self._values
         if number is None or not 1 <= number <= len(values):
             self._ring.setData([], [])
         else:

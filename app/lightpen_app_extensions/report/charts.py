@@ -9,7 +9,6 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import ArrowPlot, BudgetPlot, MarkPlot
 
 translate = QCoreApplication.translate
@@ -34,7 +33,7 @@ def _misfits(calibration: CalibrationRecord) -> Figure:
             translate("paper", "RMS residual per image / px"),
             translate("paper", "image"),
         ),
-        [Curve(name, name) for name in names],
+        names,
     )
     parts = (np.where(part, heights, np.nan) for part in (used, ~used))
     plot.set_data(np.arange(1.0, len(misfits) + 1), *parts)

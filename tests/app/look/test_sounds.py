@@ -14,23 +14,11 @@ from lightpen_app.look.sounds import (
     KEPT_STEPS,
     RATE,
     TONES,
-    FileSounds,
-    MutedSounds,
-    SilentSounds,
     Sound,
+    Sounds,
     find_sounds,
     sound_wav,
 )
-
-
-class Recorder:
-    """Remembers what was played."""
-
-    def __init__(self) -> None:
-        self.played: list[Sound] = []
-
-    def play(self, sound: Sound, progress: float = 0.0) -> None:
-        self.played.append(sound)
 
 
 def samples_of(data: bytes) -> FloatArray:
@@ -76,7 +64,7 @@ def test_sounds_neither_clip_nor_click() -> None:
 
 def test_a_file_is_written_once_and_played(tmp_path: Path) -> None:
     played: list[Path] = []
-    sounds = FileSounds(tmp_path / "sounds", played.append)
+    sounds = Sounds(tmp_path / "sounds", played.append)
 
     sounds.play(Sound.KEPT, 0.5)
     sounds.play(Sound.KEPT, 0.51)
@@ -89,20 +77,21 @@ def test_a_full_disk_silences_but_stops_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     played: list[Path] = []
 
-    FileSounds(tmp_path / "file", played.append).play(Sound.DONE)
+    Sounds(tmp_path / "file", played.append).play(Sound.DONE)
 
     assert played == []
 
 
-def test_mute_lets_nothing_through_until_it_is_lifted() -> None:
-    recorder = Recorder()
-    mute = MutedSounds(recorder, muted=True)
+def test_mute_lets_nothing_through_until_it_is_lifted(tmp_path: Path) -> None:
+    played: list[Path] = []
+    sounds = Sounds(tmp_path, played.append)
 
-    mute.play(Sound.SEATED)
-    mute.muted = False
-    mute.play(Sound.DONE)
+    sounds.muted = True
+    sounds.play(Sound.SEATED)
+    sounds.muted = False
+    sounds.play(Sound.DONE)
 
-    assert recorder.played == [Sound.DONE]
+    assert [path.name for path in played] == ["done-0.wav"]
 
 
 def test_a_machine_without_a_player_says_why_it_is_silent(
@@ -113,9 +102,9 @@ def test_a_machine_without_a_player_says_why_it_is_silent(
 
     sounds = find_sounds(tmp_path)
 
-    assert isinstance(sounds, SilentSounds)
-    assert "aplay" in caplog.text
     sounds.play(Sound.DONE)
+    assert "aplay" in caplog.text
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow

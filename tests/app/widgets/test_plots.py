@@ -1,7 +1,5 @@
 """Plots show new data without being made anew, and save themselves."""
 
-from pathlib import Path
-
 import numpy as np
 import pyqtgraph as pg
 import pytest
@@ -10,9 +8,8 @@ from PySide6.QtGui import QFontMetricsF, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
-from tests.app.pictures import colors_in
+from tests.app.pictures import colors_in, data_of
 
-from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.figures import arrow_scale, budget_figure
 from lightpen_app.look.languages import LanguageSwitch
@@ -20,7 +17,7 @@ from lightpen_app.look.theme import DARK, LIGHT, TextSize, apply_theme, font
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.swing.view import SwingPlots
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.plots import Canvas, Curve, Plot, TracePlot
+from lightpen_app.widgets.plots import Canvas, TracePlot
 from lightpen_app.widgets.result_plots import (
     HEAD,
     ArrowPlot,
@@ -32,11 +29,6 @@ from lightpen_app.widgets.result_plots import (
 
 IMAGES = np.arange(1.0, 6.0)
 VALUES = np.array([0.06, 0.05, np.nan, 0.07, 0.06])
-
-
-def numbers(plot: Plot, column: str) -> FloatArray:
-    """Return a column of numbers behind a plot."""
-    return np.array(plot.columns()[column], dtype=np.float64)
 
 
 def show(qtbot: QtBot, plot: Figure) -> None:
@@ -53,9 +45,7 @@ def shown_colors(plot: Figure) -> set[str]:
 
 @pytest.fixture
 def trace(qtbot: QtBot) -> TracePlot:
-    plot = TracePlot(
-        Axes("RMS residual / px", "image"), [Curve("misfit_px")], y_zero=True
-    )
+    plot = TracePlot(Axes("RMS residual / px", "image"), y_zero=True)
     show(qtbot, plot)
     plot.set_data(IMAGES, VALUES)
     return plot
@@ -114,7 +104,6 @@ def test_arrows_point_along_the_residuals_with_v_downwards(qtbot: QtBot) -> None
     scale = plot.scale()
     assert (x[0], y[0], x[1], y[1]) == (1000, 500, 1000 + 0.05 * scale, 500)
     assert (x[6], y[6], x[7], y[7]) == (600, 1500, 600, 1500 - 0.1 * scale)
-    assert sorted(plot.columns()) == ["residual_x_px", "residual_y_px", "x_px", "y_px"]
 
 
 def test_the_place_of_the_leds_stays_in_sight_when_the_plot_is_resized(
@@ -135,7 +124,7 @@ def test_the_place_of_the_leds_stays_in_sight_when_the_plot_is_resized(
     assert bottom >= 1500
 
 
-def test_of_many_arrows_the_means_are_drawn_and_all_are_saved(qtbot: QtBot) -> None:
+def test_of_many_arrows_the_means_are_drawn(qtbot: QtBot) -> None:
     plot = ArrowPlot(Axes("Residuals"))
     show(qtbot, plot)
     rng = np.random.default_rng(1)
@@ -148,7 +137,6 @@ def test_of_many_arrows_the_means_are_drawn_and_all_are_saved(qtbot: QtBot) -> N
     assert 300 < len(x) / 6 <= 21 * 21
     shafts = np.column_stack([x[1::6] - x[0::6], y[1::6] - y[0::6]]) / plot.scale()
     np.testing.assert_allclose(shafts.mean(axis=0), pattern, atol=0.005)
-    assert len(numbers(plot, "x_px")) == 3000
 
 
 @pytest.mark.parametrize(
@@ -177,7 +165,6 @@ def test_images_far_off_leave_the_others_apart(misfits: MisfitPlot) -> None:
     assert top < 0.2
     assert misfits.place_of(2) == (2, 0.06)
     assert misfits.place_of(4)[1] < top
-    assert numbers(misfits, "misfit_px")[2] == 3.0  # saved as it is
 
 
 def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> None:
@@ -208,10 +195,8 @@ def test_a_click_on_a_dot_chooses_its_image(misfits: MisfitPlot, qtbot: QtBot) -
     assert chosen.args == [2]
 
 
-def test_bars_stand_at_their_labels_and_are_saved_with_them(
-    qtbot: QtBot, tmp_path: Path
-) -> None:
-    plot = BarPlot(Axes("LEDs"), [Curve("rms", "rms"), Curve("mean", "mean")], "led")
+def test_bars_stand_at_their_labels(qtbot: QtBot) -> None:
+    plot = BarPlot(Axes("LEDs"), ("rms", "mean"))
     show(qtbot, plot)
 
     plot.set_data(["1", "2"], np.array([0.05, np.nan]), np.array([-0.01, 0.01]))
@@ -221,7 +206,6 @@ def test_bars_stand_at_their_labels_and_are_saved_with_them(
     assert right >= 1.4
     assert bottom <= -0.01
     assert top >= 0.05
-    assert list(plot.columns()) == ["led", "rms", "mean"]
 
 
 def test_the_budget_is_sorted_and_says_what_is_assumed_and_the_limit(
@@ -237,11 +221,11 @@ def test_the_budget_is_sorted_and_says_what_is_assumed_and_the_limit(
 
     plot.set_value(budget_figure(shares, 0.005, 0.012))
 
-    columns = plot.columns()
-    names = "combined", "form of ball, cone", "noise", "camera"
-    assert columns["part"] == names
-    assert list(columns["expanded_uncertainty_mm"]) == [0.005, 0.004, 0.003, 0.0]
-    assert columns["assumed"] == ("false", "true", "false", "false")
+    shown = [(each.name, each.value, each.assumed) for each in plot.value().bars]
+    assert shown == [
+        *(("combined", 0.005, False), ("form of ball, cone", 0.004, True)),
+        *(("noise", 0.003, False), ("camera", 0.0, False)),
+    ]
     within = shown_colors(plot)
     assert DARK.accent in within
     assert DARK.bad not in within
@@ -281,7 +265,7 @@ def test_the_names_of_a_budget_never_overlap(qtbot: QtBot) -> None:
 
 
 def test_the_name_of_an_axis_that_is_too_short_for_it_is_left_out(qtbot: QtBot) -> None:
-    plot = TracePlot(Axes("Uncertainty", "image", "U (k = 2) / mm"), [Curve("u_mm")])
+    plot = TracePlot(Axes("Uncertainty", "image", "U (k = 2) / mm"))
     label = plot.findChildren(pg.PlotWidget)[0].getPlotItem().getAxis("left").label
     for height, is_named in ((240, True), (110, False), (240, True)):
         show(qtbot, plot)
@@ -291,9 +275,9 @@ def test_the_name_of_an_axis_that_is_too_short_for_it_is_left_out(qtbot: QtBot) 
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
-    plot = MarkPlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")])
+    plot = MarkPlot(Axes("Tip"), ("x", "y"))
     show(qtbot, plot)
-    bars = BarPlot(Axes("U"), [Curve("x_um", "x"), Curve("y_um", "y")], "part")
+    bars = BarPlot(Axes("U"), ("x", "y"))
     show(qtbot, bars)
 
     for each in (plot, bars):
@@ -307,8 +291,8 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
     plot.set_data(np.radians([10.0, 20.0]), np.radians([0.0, 90.0]))
 
-    np.testing.assert_allclose(numbers(plot, "right_deg"), [10, 0], atol=1e-9)
-    np.testing.assert_allclose(numbers(plot, "away_deg"), [0, 20], atol=1e-9)
+    dots = data_of(plot, pg.ScatterPlotItem)
+    np.testing.assert_allclose(dots, [[10, 0], [0, 20]], atol=1e-9)
     (left, right), (bottom, top) = plot.ranges()
     assert left <= -36
     assert right >= 36
@@ -317,8 +301,8 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
 
 def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
-    bars = BarPlot(Axes("LEDs"), [Curve("rms")], "led")
-    lines = MarkPlot(Axes("Tip"), [Curve("x_um")])
+    bars = BarPlot(Axes("LEDs"), ("rms",))
+    lines = MarkPlot(Axes("Tip"), ("x",))
     for plot in (bars, lines):
         show(qtbot, plot)
     before = bars.n_items(), lines.n_items()
@@ -331,7 +315,7 @@ def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
 
 
 def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:
-    plot = TracePlot(Axes("x / mm", "swing"), [Curve("x")])
+    plot = TracePlot(Axes("x / mm", "swing"))
     show(qtbot, plot)
     canvas = plot.findChild(Canvas)
     assert canvas is not None
@@ -349,7 +333,7 @@ def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:
 
 
 def test_an_axis_within_a_decade_has_more_than_one_number(qtbot: QtBot) -> None:
-    plot = TracePlot(Axes("U", "swing"), [Curve("U")], y_log=True)
+    plot = TracePlot(Axes("U", "swing"), y_log=True)
     show(qtbot, plot)
     canvas = plot.findChild(Canvas)
     assert canvas is not None

@@ -32,7 +32,6 @@ from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.live_markers import CameraSwitch
-from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import (
     ArrowPlot,
     BarPlot,
@@ -92,9 +91,8 @@ class ResidualsPanel(PlotsPanel):
     def __init__(self) -> None:
         # Widgets
         self._arrows, self._lens = ArrowPlot(Axes("")), ArrowPlot(Axes(""))
-        series = Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")
         axes = Axes(self.tr("Residuals by LED / px"), self.tr("LED"))
-        self._leds = BarPlot(axes, series, "led")
+        self._leds = BarPlot(axes, ("", "", ""))
         super().__init__(
             [PlotCard(self._arrows), PlotCard(self._leds), PlotCard(self._lens)]
         )

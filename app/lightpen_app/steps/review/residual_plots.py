@@ -57,11 +57,6 @@ class MisfitPlot(Plot):
         self._out.setData(x[~used], heights[~used], data=numbers[~used])
         places = zip(x.tolist(), heights.tolist(), strict=True)
         self._places = dict(zip(numbers.tolist(), places, strict=True))
-        self._columns = {
-            "image": x,
-            "misfit_px": misfits,
-            "used": used.astype(np.float64),
-        }
         self._fit(x, np.append(heights, 1.2 * heights.max(initial=0.0)), y_zero=True)
         self.set_number(self._number)
 

@@ -28,7 +28,7 @@ from lightpen_app.widgets.fitting import (
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.plots import Curve, TracePlot
+from lightpen_app.widgets.plots import TracePlot
 from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.state_banner import SignLabel, StateBanner
 from lightpen_app.work.live_view import DisplayedImage
@@ -236,7 +236,7 @@ class SwingPlots(Translated, QWidget):
         image = self.tr("image")
         axes = Axes(self.tr("Residual of each image"), image, "RMS / px")
         misfit = self.say(
-            TracePlot(axes, [Curve("misfit_px")], y_zero=True),
+            TracePlot(axes, y_zero=True),
             tip=self.tr(
                 "How far the LEDs of an image are from where the fit expects them. "
                 "This fit takes the LEDs as in their file; that of the review may "
@@ -244,27 +244,24 @@ class SwingPlots(Translated, QWidget):
             ),
         )
         axes = Axes(self.tr("Uncertainty of the tip"), image, self.tr("U (k = 2) / µm"))
-        curves = [Curve("expanded_uncertainty_um"), Curve("floor_um")]
         uncertainty = self.say(
-            TracePlot(axes, curves, y_log=True),
+            TracePlot(axes, ("U", ""), y_log=True),
             tip=self.tr(
                 "U of the tip in its weakest direction. The swing ends below the limit "
                 "(horizontal line). Dashed: what more images cannot improve."
             ),
         )
         axes = Axes(self.tr("Tip of each image"), image, "µm")
-        curves = [Curve(f"{a}_um", a) for a in CAMERA_AXES]
         scatter = self.say(
-            TracePlot(axes, curves, is_robust=True),
+            TracePlot(axes, CAMERA_AXES, is_robust=True),
             tip=self.tr(
                 "The tip by each image alone, from the cone: u to the right, v down, w "
                 "away from the camera. A step means that the tip has slipped."
             ),
         )
         axes = Axes(self.tr("Estimate of the tip"), image, "µm")
-        curves = [Curve(f"{a}_um", a) for a in AXES]
         estimate = self.say(
-            TracePlot(axes, curves, is_robust=True),
+            TracePlot(axes, AXES, is_robust=True),
             tip=self.tr(
                 "The tip by all images so far, from its newest value. First estimates "
                 "that are far off are cut off."

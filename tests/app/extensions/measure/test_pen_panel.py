@@ -1,6 +1,7 @@
 """What is reported of the pen is of the pen that is chosen now."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QThreadPool
 from pytestqt.qtbot import QtBot
@@ -8,7 +9,7 @@ from tests.accepted_tip import accept_tip
 
 from lightpen_app.look.phrases import GRADE_MARKS
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.sounds import SilentSounds
+from lightpen_app.look.sounds import Sounds
 from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.check_list import ROW, CheckList, CheckRow
@@ -49,7 +50,7 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
 def test_the_pen_is_ticked_off_once_two_swings_of_it_are_read(
     qtbot: QtBot, workbench: Workbench
 ) -> None:
-    page = VerifyPage(MeasureService(workbench), SilentSounds())
+    page = VerifyPage(MeasureService(workbench), Sounds(Path()))
     qtbot.addWidget(page)
     panel = page.findChild(PenPanel)
     checks = page.findChild(CheckList)

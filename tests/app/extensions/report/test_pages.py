@@ -8,7 +8,6 @@ from PySide6.QtGui import QTextDocument
 
 from lightpen_app.look.words import unbroken
 from lightpen_app.widgets.figure import Axes
-from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.result_plots import MarkPlot
 from lightpen_app_extensions.report.pages import ROOM, lay_out
 from lightpen_app_extensions.report.template import Piece, charts, paragraph, table
@@ -72,7 +71,7 @@ def test_the_head_of_a_table_is_repeated_where_it_goes_on() -> None:
 
 
 def test_plots_are_as_wide_and_high_as_stated() -> None:
-    plot = MarkPlot(Axes("tip"), [Curve("x")])
+    plot = MarkPlot(Axes("tip"), ("x",))
     document = lay_out(charts({"tip": plot}, 1000.0))
 
     assert document.documentLayout().documentSize().height() >= 1000

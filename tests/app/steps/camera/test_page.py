@@ -37,7 +37,7 @@ from lightpen.live.pipeline import LiveImage
 from lightpen.live.sources import Operator
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice, SourceKind
-from lightpen_app.look.sounds import SilentSounds
+from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
@@ -86,7 +86,7 @@ def exposure(seen: "Seen") -> str:
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
     with undressed():
-        page = CameraPage(workbench, SilentSounds())
+        page = CameraPage(workbench, Sounds(Path()))
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()

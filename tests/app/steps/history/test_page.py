@@ -9,6 +9,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import pyqtgraph as pg
 import pytest
 from benchmarks.small_records import record_of, small_record
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, QThreadPool
@@ -25,6 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import data_of
 from tests.app.room import scrolled_sideways
 from typing_extensions import override
 
@@ -424,8 +426,8 @@ def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     desk.until(lambda: len(panel.value().tips) == 4)
 
     x, _, _, u = panel.plots()
-    assert list(x.columns()["value_mm"]) == [0.0, 1.0, 2.0, 3.0]
-    assert list(u.columns()["value_mm"]) == [0.0061] * 4
+    assert list(data_of(x, pg.PlotCurveItem)[1]) == [0.0, 1.0, 2.0, 3.0]
+    assert list(data_of(u, pg.PlotCurveItem)[1]) == [0.0061] * 4
     assert [plot.marked() for plot in panel.plots()] == [3] * 4
     (left, right), (low, high) = u.ranges()
     assert left < 1 < 10 < right  # so few are not numbered in fractions

@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 from lightpen.arrays import FloatArray
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, solve_record
+from lightpen_app.look.figures import MANY, cell_means
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
@@ -95,8 +96,10 @@ def test_the_residuals_over_the_image_are_of_the_camera_that_is_chosen(
         press(panel, f"Camera {camera + 1}")
         used = solution.calibration.cameras[camera].leds_used
         points = solution.seen_by(camera).seen_pixels[used]
-        starts = list(arrows.columns().values())[:2]
-        np.testing.assert_array_equal(np.array(starts, dtype=float), points.T)
+        starts = np.array([each[::6] for each in arrows.lines()]).T
+        if len(points) > MANY:
+            points, _ = cell_means(points, points)
+        np.testing.assert_allclose(starts, points)
 
 
 def test_two_cameras_need_no_more_width_than_one(

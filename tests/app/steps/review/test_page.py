@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from benchmarks.small_records import small_record
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QUrl
@@ -64,7 +65,6 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.page import ReviewPage
-from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot, ResidualView
 from lightpen_app.steps.review.result_panel import (
@@ -79,6 +79,7 @@ from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.figure import Figure
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.page import MainAction
+from lightpen_app.widgets.result_plots import BarPlot
 from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
@@ -1367,9 +1368,10 @@ def test_a_swing_without_a_tip_shows_its_cause_once_and_its_residuals(
     assert [tabs.isTabEnabled(i) for i in range(tabs.count())] == [
         tabs.tabText(i) in ("Result", "Residuals") for i in range(tabs.count())
     ]
-    plots = [card.plot.columns() for card in failed.findChildren(PlotCard)]
-    (leds,) = (columns for columns in plots if "rms_px" in columns)
-    assert (np.asarray(leds["rms_px"], dtype=float) > 0).all()
+    (leds,) = failed.findChildren(BarPlot)
+    items = leds.findChildren(pg.PlotWidget)[0].getPlotItem().items
+    rms = next(each for each in items if isinstance(each, pg.BarGraphItem))
+    assert (rms.opts["height"] > 0).all()
     assert failed.main_action() == MainAction("Capture more")
     assert button(failed, "Repeat swing").isEnabled()
     assert not button(failed, "Copy tip").isEnabled()

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
@@ -13,6 +15,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QTabBar
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
 from tests.app.patience import PATIENCE_MS
+from tests.app.pictures import data_of
 from tests.faulty_camera import FaultyCamera, scene_of
 
 from lightpen.cameras.protocol import CameraSettings
@@ -26,7 +29,7 @@ from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.swing.capture.state import Pause, Phase, SwingState
 from lightpen.swing.preparation import SourceChoice
 from lightpen_app.look.phrases import grade_text, phrase
-from lightpen_app.look.sounds import Sound
+from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.swing.page import SwingPage
 from lightpen_app.widgets.bars import QuestionBar
@@ -49,10 +52,11 @@ LONG = SwingLimits(max_uncertainty=1e-5, min_images=5000, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
 
 
-class Recorder:
+class Recorder(Sounds):
     """Remembers what was played."""
 
     def __init__(self) -> None:
+        super().__init__(Path())
         self.played: list[tuple[Sound, float]] = []
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
@@ -447,7 +451,7 @@ def test_the_plots_can_be_read(qtbot: QtBot, capturing: Desk) -> None:
         seen = [plot for plot in plots if plot.isVisible()]
         assert all(plot.height() >= 120 for plot in seen)
         assert all(plot.toolTip() for plot in seen)
-        until(qtbot, lambda: all(len(plot.columns()) > 1 for plot in seen))
+        until(qtbot, lambda: all(data_of(p, pg.PlotCurveItem).size for p in seen))
         return [plot.accessibleName() for plot in seen]
 
     assert names() == ["Residual of each image", "Uncertainty of the tip"]
