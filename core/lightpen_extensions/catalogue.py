@@ -147,7 +147,6 @@ MESSAGES = {
     "stream.port-taken": "Port {port} is in use already, by another window or another program. Choose another port, or close that one.",
     "stream.no-address": "{address} is not an address of this computer. Give its address in the network of the clients, or {loopback} for this computer only.",
     "stream.no-package": 'Streaming needs the package pyigtl, which is not installed. Install it with: pip install "lightpen[stream]".',
-    "verification.no-supervisor": "The tip is outside the limits. {why} Only a supervisor can accept it, with a reason.",
     "verification.no-tip": "Tip {tip} of pen {pen} has no accepted calibration. Calibrate it and accept the result; then it can be verified.",
     "verification.no-rig-folders": "{place} contains no images of two cameras. Give a folder that contains one folder per camera, named as in the rig file: {names}.",
     "verification.other-number-of-cameras": "{place} contains the images of {n_given} cameras; the verification uses {n_cameras}. Give the intrinsics file or the rig file of these images.",

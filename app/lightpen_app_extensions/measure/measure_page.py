@@ -46,7 +46,7 @@ class MeasurePresenter(VerifyPresenter):
     def view(self) -> VerifyView:
         view = super().view()
         begins_anew = view.can_start_over and not self._status.is_done
-        return replace(view, can_be_accepted=False, can_start_over=begins_anew)
+        return replace(view, can_start_over=begins_anew)
 
     @override
     def next_step(self) -> str:

@@ -49,7 +49,6 @@ class VerifyView:
     current: int = 0  # row of what is probed now
     task: AnyTask | None = None  # the current one
     pause: str = ""
-    can_be_accepted: bool = False
     can_start_over: bool = False
     can_undo: bool = False
     has_report: bool = False
@@ -83,9 +82,6 @@ class VerifyPresenter(QObject):
                 if status.is_paused
                 else self.tr("Pause (Space)")
             ),
-            can_be_accepted=self.is_doubtful()
-            and status.is_done
-            and not status.accepted_by,
             has_report=status.is_done and bool(status.files),
             can_start_over=status.state is not None and status.state.is_begun,
             can_undo=status.state is not None and bool(status.state.touches),
@@ -172,9 +168,7 @@ class VerifyPresenter(QObject):
         doubt = grade_text(Grade.CHECK) if self.tip_is_doubted() else ""
         files = ", ".join(file.name for file in status.files)
         kept = self.tr("saved as {0}").format(files) if files else ""
-        by = shortened(status.accepted_by) if status.accepted_by else ""
-        accepted = self.tr("accepted by {0}").format(by) if by else ""
-        parts = words, doubt, self._tip_status(), kept, accepted
+        parts = words, doubt, self._tip_status(), kept
         return PARTED.join(filter(None, parts))
 
     def _purpose(self) -> str:

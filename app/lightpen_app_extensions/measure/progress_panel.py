@@ -7,8 +7,6 @@ from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
-from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.library.supervision import Signature
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import (
     fill,
@@ -17,7 +15,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.widgets.bars import Question, QuestionBar, ReasonBar, usual_reasons
+from lightpen_app.widgets.bars import Question, QuestionBar
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.fitting import (
@@ -53,7 +51,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         # Widgets
         self._question = QuestionBar()
         self._question.set_words(self._starting_over)
-        self._reason = ReasonBar()
         self._instruction = FittedText(TextSize.TITLE)
         self._instruction.setMinimumHeight(4 * GRID)
         self._act = PushButton()
@@ -62,8 +59,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
             self._on_start_over_clicked,
             tip=self.tr("Discard all points, and start with the current tip."),
         )
-        tip = self.tr("Use the tip with a reason")
-        self._accept = self.make_button(self.tr("Accept..."), self._ask_reason, tip=tip)
         self._report = self.make_button(self.tr("Report..."), self._on_report_clicked)
         self._print_report = PrintReportControl(workbench.save_place, self)
         tip = self.tr("Discard the last point of the current task.")
@@ -79,25 +74,22 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._progress = self.say(bar, self.tr("Progress"))
 
         # Layout
-        layout = vertical_layout(self, self._question, self._reason)
+        layout = vertical_layout(self, self._question)
         self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         horizontal_layout(
             self.state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
         numbers = 1, self._count, self._progress, 1
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
-        buttons = self._accept, self._report, self._act, self._undo, self._start_over
+        buttons = self._report, self._act, self._undo, self._start_over
         self._row = horizontal_layout(self._buttons, *buttons, 1)
         self._use_room()
 
         # Connections
-        self._run.refused.connect(self._on_refused)
         self._act.clicked.connect(self.toggle_pause)
         self._question.agreed.connect(self._begin_anew)
         self._print_report.failed.connect(partial(workbench.notifications.notify, self))
         self._print_report.saved.connect(self._on_saved)
-        self._reason.given.connect(self._on_reason_given)
-        self._reason.declined.connect(self._accept.setFocus)
 
         self._retranslate()
 
@@ -115,10 +107,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._undo.setVisible(view.task is not None)
         self._undo.setEnabled(view.can_undo)
         self._start_over.setVisible(view.can_start_over)
-        self._accept.setVisible(view.can_be_accepted)
         self._report.setVisible(view.has_report)
-        if not view.can_be_accepted:
-            self._reason.hide()
 
     def set_low(self, *, low: bool) -> None:
         """Make do with little height, or not."""
@@ -150,19 +139,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._rows.setColumnStretch(0, 1)
         self._rows.setColumnStretch(1, 0 if is_narrow else 1)
 
-    @override
-    def _retranslate(self) -> None:
-        self._reason.set_words(
-            self.tr(
-                "This result needs checking. Enter the reason for using the tip. It is "
-                "kept with the verification."
-            ),
-            self.tr("Reason"),
-            self.tr("Accept with reason"),
-            self.tr("Do not accept"),
-            usual_reasons(),
-        )
-
     def _starting_over(self) -> Question:
         return Question(
             self.tr("Start over? Results are kept."),
@@ -186,19 +162,6 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
     def _on_saved(self, path: Path) -> None:
         words = self.tr("Saved: {0}").format(path)
         self._workbench.notifications.show_status(words)
-
-    def _ask_reason(self) -> None:
-        found = self._run.status.assessment
-        is_beyond = found is not None and found.grade is Grade.REPEAT
-        is_guarded = self._workbench.selection.supervision.is_guarded
-        self._reason.ask(of_supervisor=is_guarded or is_beyond)
-
-    def _on_reason_given(self, reason: str, signature: Signature | None) -> None:
-        self._runner.ask(lambda workflow: workflow.accept(reason, signature))
-
-    def _on_refused(self) -> None:
-        if not self._accept.isHidden():
-            self._reason.refuse()
 
     def _on_start_over_clicked(self) -> None:
         status = self._run.status

@@ -364,7 +364,6 @@ def _verification_report(content: ReportContent, kept: KeptVerification) -> Prin
         "limits": [(_title(n), x) for n, x in verdict.limits_mm.items()]
         if verdict
         else [],
-        "reason": verdict and (done.reason or None),
         "n_observations": len(inputs.get("images", ())),
         "files": _verification_files(inputs),
     }

@@ -297,8 +297,6 @@ def _of_tip(
         "verified": done.verification,
         **{f"max_{name}_mm": value for name, value in limits.items()},
     }
-    if done.supervisor:
-        settings["supervisor"] = done.supervisor
     return Event(
         kind=Kind.VERIFICATION,
         at=done.created,
@@ -307,7 +305,6 @@ def _of_tip(
         origin=done.origin,
         grade="" if verdict is None else verdict.grade,
         why=done.why,
-        reason=done.reason,
         outcome=done.outcome,
         settings=settings,
         result=place,

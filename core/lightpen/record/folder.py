@@ -30,8 +30,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.part_files import sweep_parts
 from lightpen.messages import message
 from lightpen.model.names import Origin
-from lightpen.record.library.entered_files import add_numbered, entered_files
-from lightpen.record.library.supervision import read_supervision
+from lightpen.record.library.entered_files import add_numbered
 from lightpen.record.results.result_folder import RECORDS, RESULTS, SIMULATED
 from lightpen.record.swings.header import HEADER, Names
 from lightpen.record.swings.reading import IMAGES, JOURNAL, OPENER, last_verdict
@@ -201,8 +200,6 @@ class StoredVerification(Struct, frozen=True):
     camera_serials: tuple[str, ...] = ()  # of the cameras that saw the pen
     verdict: _Verdict | None = None
     ended: TrialOutcome | None = field(name="outcome", default=None)
-    reason: str = ""  # conclusion only: why a tip is used that did not pass
-    supervisor: str = ""  # conclusion only: who approved that
     inputs: _Inputs = _Inputs()
 
     def __post_init__(self) -> None:
@@ -238,17 +235,11 @@ def is_verification(content: bytes) -> bool:
 
 
 def read_verification(content: bytes, file: Path) -> StoredVerification:
-    """Read the file of a verification, approved as it must be in a data folder."""
+    """Read the file of a verification."""
     try:
-        done = parse_checked(content, StoredVerification)
+        return parse_checked(content, StoredVerification)
     except DamagedError as error:
         raise FileError("verification.damaged", file=file) from error
-    data = data_folder_of_verification(file)
-    if data is not None and done.supervisor:
-        counted = entered_files(data).counted(file, content)
-        if counted is not None:
-            counted.require_approved(read_supervision(data).key)
-    return done
 
 
 def data_folder_of_verification(file: Path) -> Path | None:

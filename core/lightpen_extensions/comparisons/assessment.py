@@ -33,7 +33,6 @@ from lightpen.model.limits import VerificationLimits, rule_name
 from lightpen.model.names import Origin
 from lightpen.record.folder import VERIFICATIONS
 from lightpen.record.library.entered_files import add_numbered
-from lightpen.record.library.signing import SigningKey
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 
@@ -234,18 +233,11 @@ def attributed(
 
 
 def keep_verification(
-    data: Path,
-    record: Mapping[str, Any],
-    supervisor: SigningKey | None = None,
-    *,
-    is_simulated: bool,
+    data: Path, record: Mapping[str, Any], *, is_simulated: bool
 ) -> Path:
-    """Keep the record of a verification in a data folder, and return its file.
-
-    The supervisor whom it names approves it.
-    """
+    """Keep the record of a verification in a data folder, and return its file."""
     folder = verifications_folder(data, is_simulated=is_simulated)
-    return add_numbered(data, folder, record_bytes(record), supervisor)
+    return add_numbered(data, folder, record_bytes(record))
 
 
 def verifications_folder(data: Path, *, is_simulated: bool) -> Path:

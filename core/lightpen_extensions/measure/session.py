@@ -360,7 +360,6 @@ class VerificationStatus:
     reading: ReadingState = ReadingState.NOTHING
     is_here: bool = False  # an operator is present
     is_paused: bool = False
-    accepted_by: str = ""  # supervisor, despite findings
     refusal: Message | None = None  # why nothing can be verified
 
     @property

@@ -25,7 +25,6 @@ from lightpen.errors import FileError, LightpenError
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 from lightpen.record.folder import TOUCHES, TrialOutcome
-from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.header import Header
 from lightpen.record.swings.writing import make_record_folder
@@ -57,11 +56,7 @@ from lightpen_extensions.measure.session import (
     with_pen_at_rest,
     without_last_touch,
 )
-from lightpen_extensions.measure.storage.session_files import (
-    Conclusion,
-    SessionKeeping,
-    accepting_supervisor,
-)
+from lightpen_extensions.measure.storage.session_files import SessionKeeping
 from lightpen_extensions.measure.storage.session_record import (
     InterruptedVerification,
     ResumedVerification,
@@ -168,30 +163,6 @@ class VerificationWorkflow:
         if before is None or not before.touches:
             return
         self._follow(before, SessionTransition(without_last_touch(before)))
-
-    def accept(self, reason: str, signature: Signature | None = None) -> None:
-        """Accept the tip despite findings, or report why not."""
-        self._faults.trying(lambda: self._accept(reason.strip(), signature))
-
-    def _accept(self, reason: str, signature: Signature | None) -> None:
-        self._write()  # what is accepted is named by its files
-        status = self._status
-        tip, found, began = status.tip, status.assessment, status.began
-        is_written = not self._keeping.is_behind
-        is_open = status.is_done and is_written and not status.accepted_by
-        if not is_open or tip is None or found is None or began is None or not reason:
-            return
-        supervision = self._archive.supervision()
-        supervisor, key = accepting_supervisor(supervision, found, signature)
-        conclusion = Conclusion(
-            TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor, key
-        )
-        self._keeping.accept(tip, conclusion)
-        _logger.info("accepted, reason %r", reason)
-        self._faults.end()
-        accepted_by = supervisor or tip.names.operator
-        kept = self._keeping.files
-        self._publish(replace(status, files=kept, accepted_by=accepted_by))
 
     def end_task(self) -> None:
         """End the current task with its touches, if they suffice."""

@@ -3023,30 +3023,6 @@
 <context>
     <name>ProgressPanel</name>
     <message>
-        <source>This result needs checking. Enter the reason for using the tip. It is kept with the verification.</source>
-        <translation>该结果需要核查。请输入仍使用该测头的理由。理由随验证一起保存。</translation>
-    </message>
-    <message>
-        <source>Reason</source>
-        <translation>理由</translation>
-    </message>
-    <message>
-        <source>Accept with reason</source>
-        <translation>按此理由接受</translation>
-    </message>
-    <message>
-        <source>Do not accept</source>
-        <translation>不接受</translation>
-    </message>
-    <message>
-        <source>Accept...</source>
-        <translation>接受...</translation>
-    </message>
-    <message>
-        <source>Use the tip with a reason</source>
-        <translation>说明理由后使用测头</translation>
-    </message>
-    <message>
         <source>Report...</source>
         <translation>报告…</translation>
     </message>
@@ -4687,10 +4663,6 @@
     <message>
         <source>saved as {0}</source>
         <translation>保存为 {0}</translation>
-    </message>
-    <message>
-        <source>accepted by {0}</source>
-        <translation>由 {0} 接受</translation>
     </message>
     <message>
         <source>No point is recorded yet.</source>
@@ -7710,10 +7682,6 @@
     <message>
         <source>The tip is computed after all recorded images are loaded.</source>
         <translation>载入全部录制图像后计算测头。</translation>
-    </message>
-    <message>
-        <source>The tip is outside the limits. {why} Only a supervisor can accept it, with a reason.</source>
-        <translation>测头超出限值。{why}只有主管可以说明理由后接受它。</translation>
     </message>
     <message>
         <source>The tip is {distance:.1f} mm from its nominal centre. Check that the right tip is fitted.</source>

@@ -26,19 +26,11 @@ from lightpen.record.folder import (
     keep_camera_calibration,
 )
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
-from lightpen.record.library.supervision import (
-    Signature,
-    read_supervision,
-    require_supervisor,
-    save_limits,
-    set_password,
-)
+from lightpen.record.library.supervision import Signature, save_limits, set_password
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen_extensions.comparisons.assessment import (
-    CONCLUSION,
     VerificationAssessment,
-    keep_verification,
     verification_record,
 )
 from lightpen_extensions.plant.copies import entries_of, records_of
@@ -97,34 +89,13 @@ def test_a_verification_is_entered_with_who_what_and_the_hash_of_each_image(
     assert json.loads(record)["inputs"]["images"][0]["sha256"] == HASH
 
 
-def test_a_verification_that_did_not_pass_is_refused_until_somebody_accepts_it(
+def test_a_verification_that_did_not_pass_is_refused(
     tmp_path: Path, logbook: Logbook
 ) -> None:
     keep(tmp_path, Grade.REPEAT)
-    conclusion = {
-        "program": {"name": "lightpen", "version": "1"},
-        "created": NOON.isoformat(),
-        "verification": CONCLUSION,
-        "outcome": "accepted",
-        "operator": "Ann",
-        "verdict": {
-            "grade": "repeat",
-            "code": "test.found",
-            "text": "image",
-            "values": {},
-        },
-        "supervisor": "Eve",
-        "reason": "for a trial",
-    }
-    add_numbered(tmp_path, tmp_path / VERIFICATIONS, record_bytes(conclusion))
 
-    refused, accepted = events(logbook)
-    assert (refused.outcome, accepted.outcome) == (
-        TrialOutcome.REFUSED,
-        TrialOutcome.ACCEPTED,
-    )
-    assert (accepted.grade, accepted.reason) == ("repeat", "for a trial")
-    assert accepted.settings["supervisor"] == "Eve"
+    (refused,) = events(logbook)
+    assert (refused.outcome, refused.grade) == (TrialOutcome.REFUSED, "repeat")
 
 
 def test_a_verification_of_a_simulated_pen_is_entered_as_practice(
@@ -206,46 +177,7 @@ def test_an_absurd_time_is_not_entered(tmp_path: Path, logbook: Logbook) -> None
     assert fault.code == "verification.damaged"
 
 
-def accepted_by_supervisor() -> dict[str, object]:
-    """The record of a tip that a supervisor accepts though it did not pass."""
-    return {
-        "program": {"name": "lightpen", "version": "1"},
-        "created": NOON.isoformat(),
-        "verification": CONCLUSION,
-        "outcome": "accepted",
-        "operator": "Ann",
-        "supervisor": "Eve",
-        "reason": "for a trial",
-    }
-
-
-def test_a_signed_conclusion_of_a_verification_is_entered(
-    tmp_path: Path, logbook: Logbook
-) -> None:
-    set_password(tmp_path, EVE, EVE.password, NOON)
-    key = require_supervisor(read_supervision(tmp_path), EVE)
-    keep_verification(tmp_path, accepted_by_supervisor(), key, is_simulated=False)
-
-    assert events(logbook)[-1].kind is Kind.VERIFICATION
-
-
-def test_conclusions_without_approval_are_not_entered(
-    tmp_path: Path, logbook: Logbook
-) -> None:
-    set_password(tmp_path, EVE, EVE.password, NOON)
-    record = accepted_by_supervisor()
-    by_hand = tmp_path / VERIFICATIONS / "000001.json"
-    by_hand.parent.mkdir()
-    by_hand.write_bytes(record_bytes(record))
-    keep_verification(tmp_path, record, None, is_simulated=False)  # without password
-
-    troubles = logbook.enter_owed()
-    assert [each.code for each in troubles] == ["signing.unapproved"]
-    written = entries_of(logbook.database, logbook.chain)
-    assert [each.entry.event.kind for each in written] == [Kind.LIMITS]
-
-
-def test_verifications_from_before_the_password_need_no_signature(
+def test_verifications_need_no_signature_of_a_supervisor(
     tmp_path: Path, logbook: Logbook
 ) -> None:
     keep(tmp_path, Grade.PASS)

@@ -2,10 +2,9 @@
 
 A task's record has the format that the command of its kind writes, with operator, item
 and session in addition. A verification is concluded when its task is complete: accepted
-if the limits are kept, else refused. Who accepts the tip all the same concludes it once
-more, with a reason: the last conclusion of a session counts. One that is given up
-before is abandoned. Each names all records of its session by their hashes, so that it
-stands for the whole. Files of simulated pens are kept apart.
+if the limits are kept, else refused. One that is given up before is abandoned. Each
+names all records of its session by their hashes, so that it stands for the whole. Files
+of simulated pens are kept apart.
 """
 
 import logging
@@ -16,20 +15,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from lightpen.errors import AcceptanceError, FileError
-from lightpen.estimation.reports.verdict import Grade
+from lightpen.errors import FileError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.files import unreadable
 from lightpen.formats.opened_files import InputFile, all_hashed, hashed
 from lightpen.formats.own_json import file_entry, plain, record_heading
 from lightpen.model.names import Origin
 from lightpen.record.folder import TrialOutcome
-from lightpen.record.library.signing import SigningKey
-from lightpen.record.library.supervision import (
-    Signature,
-    Supervision,
-    require_supervisor,
-)
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
@@ -68,9 +60,6 @@ class Conclusion:
     session: datetime  # when it began
     at: datetime
     found: VerificationAssessment | None = None  # the worst, if any
-    reason: str = ""  # why the tip is used despite findings
-    supervisor: str = ""  # who approved that, if needed
-    supervisor_key: SigningKey | None = None  # signs the record
 
 
 def conclusion_record(
@@ -98,27 +87,9 @@ def conclusion_record(
         "verdict": None
         if found is None
         else {"grade": found.grade.value, **plain(found.reason)},
-        "supervisor": conclusion.supervisor,
-        "reason": conclusion.reason,
         "inputs": {"tip": file_entry(tip_file)},
         "records": [file_entry(file) for file in files],
     }
-
-
-def accepting_supervisor(
-    supervision: Supervision, found: VerificationAssessment, signature: Signature | None
-) -> tuple[str, SigningKey | None]:
-    """Return name and key of the supervisor who accepts the tip.
-
-    An empty name and no key if none is needed; `AcceptanceError` if one is, and none
-    signs or the password is wrong.
-    """
-    if not supervision.is_guarded and found.grade is not Grade.REPEAT:
-        return "", None
-    if signature is None:
-        raise AcceptanceError("verification.no-supervisor", why=found.reason)
-    key = require_supervisor(supervision, signature)
-    return signature.name.strip(), key
 
 
 def task_record(
@@ -179,7 +150,6 @@ class PendingRecord:
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
     ends: SessionRecord | None = None  # that this record concludes
-    supervisor: SigningKey | None = None  # whom the record names
 
 
 class SessionKeeping:
@@ -222,10 +192,6 @@ class SessionKeeping:
         if tip is not None and began is not None:
             conclusion = Conclusion(outcome, began, self._now(), status.assessment)
             self._queue(_concluding(tip, conclusion, self.images))
-
-    def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
-        """Write the acceptance of a tip despite findings."""
-        self._write(_concluding(tip, conclusion, None), self._files)
 
     def give_up(self, status: VerificationStatus) -> None:
         """Conclude an incomplete session, as another begins."""
@@ -271,9 +237,7 @@ class SessionKeeping:
         """Write a record, after the files of its session before it."""
         record = kept.record_of(all_hashed(files))
         is_simulated = record["origin"] == Origin.SIMULATED
-        file = keep_verification(
-            self._data, record, kept.supervisor, is_simulated=is_simulated
-        )
+        file = keep_verification(self._data, record, is_simulated=is_simulated)
         files.append(file)
         _logger.info("verification written: %s", file)
         if kept.ends is not None:
@@ -289,7 +253,6 @@ def _concluding(
             tip.names, tip.origin, tip.tip_file, conclusion, files
         ),
         ends=ends,
-        supervisor=conclusion.supervisor_key,
     )
 
 

@@ -1,6 +1,5 @@
 """A verification from the tip in force to its verdict, and what is kept of it."""
 
-import json
 from contextlib import closing
 from dataclasses import replace
 from queue import SimpleQueue
@@ -17,7 +16,7 @@ from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.record.folder import TOUCHES
-from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.supervision import Signature
 from lightpen.record.swings.reading import (
     DISCARDED,
     JOURNAL,
@@ -342,42 +341,12 @@ def doubted(verifier: Verifier) -> Verifier:
     return verifier
 
 
-def test_beyond_the_limits_a_tip_is_accepted_by_no_operator(doubted: Verifier) -> None:
-    doubted.runner.ask(lambda workflow: workflow.accept("It will do."))
-    doubted.ear.wait_until(lambda: doubted.ear.faults == ["verification.no-supervisor"])
-    doubted.runner.ask(lambda workflow: workflow.accept("It will do.", EVE))
-    doubted.ear.wait_until(lambda: len(doubted.ear.faults) == 2)
+def test_what_was_found_against_a_tip_is_kept(doubted: Verifier) -> None:
+    (point,), (conclusion,) = doubted.records, doubted.conclusions
 
-    assert doubted.ear.faults[-1] == "supervisor.no-password"
-    assert doubted.status.accepted_by == ""
-    assert len(doubted.records) == 1
-
-
-def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(doubted: Verifier) -> None:
-    set_password(doubted.folder, EVE, EVE.password, NOON)
-    doubted.runner.ask(lambda workflow: workflow.accept("Only roughing today.", EVE))
-    doubted.ear.wait_until(lambda: doubted.status.accepted_by == "Eve")
-    (point,) = doubted.records
-    refusal, acceptance = doubted.conclusions
-
-    assert point["verdict"]["grade"] == refusal["verdict"]["grade"] == "repeat"
-    assert (refusal["outcome"], acceptance["outcome"]) == ("refused", "accepted")
-    assert acceptance["supervisor"] == "Eve"
-    assert acceptance["reason"] == "Only roughing today."
-    assert acceptance["operator"] == "Ann"
-    assert [each["file"] for each in acceptance["records"]] == [
-        "000001.json",
-        "000002.json",
-    ]
-    assert EVE.password not in json.dumps(doubted.records + doubted.conclusions)
-
-
-def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:
-    set_password(doubted.folder, EVE, EVE.password, NOON)
-    wrong = replace(EVE, password="wrong horse")
-    doubted.runner.ask(lambda workflow: workflow.accept("It will do.", wrong))
-    doubted.ear.wait_until(lambda: doubted.ear.faults == ["supervisor.wrong-password"])
-    assert len(doubted.records) == 1
+    assert point["verdict"]["grade"] == conclusion["verdict"]["grade"] == "repeat"
+    assert (conclusion["outcome"], conclusion["operator"]) == ("refused", "Ann")
+    assert [each["file"] for each in conclusion["records"]] == ["000001.json"]
 
 
 def test_the_archive_vouches_for_each_image_of_live_touches(at_it: Verifier) -> None:
