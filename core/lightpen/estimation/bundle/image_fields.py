@@ -97,6 +97,7 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
+NONE = 0.4  # prior probability that there is no field; else all scales are as likely
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 
@@ -109,9 +110,7 @@ class FieldName(StrEnum):
     BEND = "pen bend"
 
 
-# Half of all stations have less, before their images: px, of a tilt by the sine of the
-# lean; of a bend, mm. The prior of a size is half a Cauchy distribution.
-USUAL_SIZES = {FieldName.LENS: 0.001, FieldName.TILT: 0.0015, FieldName.BEND: 0.005}
+# Largest standard deviations: px, of a tilt by the sine of the lean; of a bend, mm.
 LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}
 
 
@@ -166,18 +165,19 @@ def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldCompone
     """
     if field.is_exact:
         return held(field)
-    sigmas = LARGEST[field.name] * np.geomspace(SMALLEST, 1.0, N_SCALES)
-    variances, ratios = sigmas[:, None] ** 2, sigmas / USUAL_SIZES[field.name]
-    parts = []
+    scales = np.concatenate([[0.0], np.geomspace(SMALLEST, 1.0, N_SCALES)])
+    prior = np.where(scales > 0, (1 - NONE) / N_SCALES, NONE)
+    sigmas, parts = LARGEST[field.name] * scales, []
     for root in field.roots:
         seen, turned = np.linalg.eigh(root.T @ S @ root)
         ways = root @ turned
-        gains = variances / (1 + np.maximum(seen, 0.0) * variances)
-        costs = np.log(variances / gains) - gains * (ways.T @ right) ** 2
+        excess = 1 + np.maximum(seen, 0.0) * sigmas[:, None] ** 2
+        gains = sigmas[:, None] ** 2 / excess
+        costs = np.log(excess) - gains * (ways.T @ right) ** 2
         parts.append((ways, gains, costs.sum(axis=1)))
     costs = np.array([part[-1] for part in parts])
     best = float(costs.min())
-    weights = np.exp(-0.5 * (costs - best)) * ratios / (1 + ratios**2)
+    weights = np.exp(-0.5 * (costs - best)) * prior
     weights /= weights.sum()
     size, average = len(S), np.zeros_like(S)
     moments = np.zeros_like(S)
