@@ -252,24 +252,21 @@ def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
 #    framework (QIF)".
 
 
+CSV = (
+    *("quantity", "features", "unit", "nominal", "lower_limit", "upper_limit"),
+    *("actual", "deviation", "expanded_uncertainty", "decision"),
+    "probability_of_conformity",
+)
+
+
 def _csv(part: MeasuredPart) -> str:
-    head = ["characteristic", "quantity", "features", "unit", "nominal", "lower_limit"]
-    head += ["upper_limit", "actual", "deviation", "expanded_uncertainty"]
-    head += ["decision", "probability_of_conformity"]
-    rows: list[list[object]] = [list(head)]
+    rows: list[list[object]] = [["characteristic", *CSV]]
     for result in part.results:
-        planned = result.planned
-        limits = ["" if np.isinf(x) else x for x in (result.lower, result.upper)]
-        rows.append(
-            [
-                *(planned.label, planned.quantity.value, " ".join(planned.of)),
-                *(planned.unit, planned.nominal, *limits),
-                *(result.value.value, result.deviation, result.value.uncertainty),
-                "" if result.decision is None else result.decision.value,
-                result.probability,
-            ]
-        )
-    return csv_table([["" if x is None else x for x in row] for row in rows])
+        entries = _result_entries(result)
+        entries["features"] = " ".join(entries["of"])
+        values = [entries["name"], *(entries[name] for name in CSV)]
+        rows.append(["" if x is None else x for x in values])
+    return csv_table(rows)
 
 
 EXPORTS = (
