@@ -147,6 +147,7 @@ MESSAGES = {
     "poses.taken-as-metres": "The translations are about {typical:.3g} long: they are taken as metres.",
     "poses.lost": "{n_lost} of {n_poses} poses are lost and left out.",
     "poses.foreign": "{name} has the form of {program}, in which poses cannot be read. Write them as a table with the header qw,qx,qy,qz,tx_mm,ty_mm,tz_mm and a line for each pose.",
+    "poses.unit": "{name} has translations in {unit}, which is no known unit. Write them in mm, cm, m, um or inch.",
     "poses.unknown-columns": "{name} has no columns of poses that are known. Its header is {header}. Name the columns qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.",
     "poses.several-tools": "{name} has the poses of {n_tools} tools: {tools}. State which one is the pen.",
     "poses.no-transform": "{name} has a transform of frame {frame} that is not 16 numbers. Record it again.",

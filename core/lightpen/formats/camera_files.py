@@ -139,7 +139,8 @@ def _sensor_camera(entries: Entries) -> Camera:
     """Return the camera of a file, of the size that its intrinsics are for."""
     chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]
     if chain and not any(_is_of_array(entries.value(key)) for key in chain):
-        return _from_kalibr(_only_camera(entries, chain))
+        camera = _only_camera(entries, chain)
+        return (_from_opencv if camera.has("K") else _from_kalibr)(camera)
     listed = entries.part("cameras") if _has_mapping(entries, "cameras") else entries
     array = [key for key in listed.values if re.fullmatch(_CAMERA_OF_ARRAY, key)]
     array = [key for key in array if _is_of_array(listed.value(key))]

@@ -457,7 +457,8 @@ def foreign_intrinsics(entries: Entries) -> Given | None:
     if entries.has("calibrations"):  # of PhotonVision, one a resolution
         entries = _descend(entries, "calibrations")
     for layout in LAYOUTS:
-        if all(entries.has(*mark.split("|")) for mark in layout.marks.split()):
+        is_marked = all(entries.has(*mark.split("|")) for mark in layout.marks.split())
+        if is_marked and (not layout.part or _holder(entries, layout.part)[0]):
             return _given(layout, entries)
     return None
 

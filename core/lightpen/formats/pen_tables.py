@@ -122,10 +122,13 @@ _LED_NAMES = (
 _COORDINATES = (("x",), ("y",), ("z",))
 _NOMINAL = " nominal"
 _NORMALS = (("nx",), ("ny",), ("nz",))
+_ACTUAL = r"(?:actual|act|measured|meas|istwert|ist)"
+_OF_PLAN = r"(nominal|nom|sollwert|soll)"
 _COLUMN = (
+    rf"(?:{_ACTUAL}[\s_]+|{_OF_PLAN}[\s_]+)?"
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
     r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value))?"
-    r"(?:[\s_]*(actual|act|measured|meas|ist)|[\s_]*(nominal|nom|soll))?"
+    rf"(?:[\s_]*{_ACTUAL}|[\s_]*{_OF_PLAN})?"
     r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
 _OTHER_COORDINATE = r"[xyz]\b(?! nominal|.*(tol|dev|diff|abw|err|sigma|std))"
@@ -196,7 +199,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     if not match:
         return column, ""
     unit = UNIT_NAMES.get(match[4] or "", "")
-    name = match[1] + (_NOMINAL if match[3] else "")
+    name = match[2] + (_NOMINAL if match[1] or match[3] else "")
     return (name, unit) if unit or not match[4] else (column, "")
 
 

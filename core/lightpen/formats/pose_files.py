@@ -82,6 +82,11 @@ class _Role:
 def tools_of(table: Table) -> list[ToolColumns]:
     """Return the tools that the header of a table names."""
     roles = [_role(name) for name in table.header]
+    for name, role in zip(table.header, roles, strict=True):
+        stated = re.search(_UNIT, name)
+        if role is not None and role.kind == "t" and stated and stated[2]:
+            unit = printable(stated[2])
+            raise FileError("poses.unit", name=table.name, unit=unit)
     matrix = _matrix(table.header)
     if matrix is not None:
         return [matrix]

@@ -6124,6 +6124,10 @@
         <translation>{name} 中的 {what} 为 {number:g}。需要大于 {least:g} 且不超过 {most:g} 的数；若未知请略去。</translation>
     </message>
     <message>
+        <source>{name} has translations in {unit}, which is no known unit. Write them in mm, cm, m, um or inch.</source>
+        <translation>{name} 的平移以 {unit} 为单位，无法识别。请以 mm、cm、m、um 或 inch 写出。</translation>
+    </message>
+    <message>
         <source>{name} has values of type {value_type}; grey values of 8 or 16 bit are needed. Save the images without conversion.</source>
         <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
     </message>

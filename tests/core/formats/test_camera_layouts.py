@@ -274,6 +274,11 @@ GYROFLOW: dict[str, Any] = {
         ),
         pytest.param(PLAIN, id="names alone"),
         pytest.param({"camera": PLAIN}, id="within a name"),
+        pytest.param({"calibration": PLAIN}, id="within a name of calib.io"),
+        pytest.param(
+            {"cameras": {"cam0": {"K": MATRIX, "dist": BROWN, "image_size": SIZE}}},
+            id="within names of SVO and Kalibr",
+        ),
         pytest.param(
             {"mtx": MATRIX, "dist_coeff": [BROWN], "img_size": SIZE_NAMED},
             id="size by names",

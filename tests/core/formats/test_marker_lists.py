@@ -147,6 +147,11 @@ def cmm(columns: str, values: str, units: str = "") -> str:
             "{nx};{x};{ny};{y};{nz};{z}",
             ";mm;mm;mm;mm;mm;mm",
         ),
+        (
+            "Measured X (mm);Nominal X (mm);Istwert Y (mm);Sollwert Y (mm);Z (mm)",
+            "{x};{nx};{y};{ny};{z}",
+            "",
+        ),
         ("X-Koordinate;Y-Koordinate;Z-Koordinate", "{x};{y};{z}", ";mm;mm;mm"),
     ],
 )

@@ -100,6 +100,13 @@ def test_the_unit_of_translations_is_that_of_their_names(
     np.testing.assert_allclose(read_poses(path).translations, MOVED, rtol=1e-9)
 
 
+def test_translations_in_an_unknown_unit_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    path.write_text("tx [ft],ty [ft],tz [ft],qw,qx,qy,qz\n1,2,3,1,0,0,0\n")
+    with pytest.raises(FileError, match="ft, which is no known unit"):
+        read_poses(path)
+
+
 def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> None:
     states = ["OK"] * N_POSES
     states[LOST] = "Missing"
