@@ -1,6 +1,9 @@
 """Messages of extensions: code, then template with named values."""
 
 MESSAGES = {
+    "archive.forked": "The local entries do not continue with {entry}. A data folder was copied and both copies were used, or entries were modified. Check both archives.",
+    "archive.record-missing": "The record of {entry} is missing or was modified. Import the entries from their station again.",
+    "archive.copy-damaged": "The copy of chain {chain} in this archive is damaged. Check the archive.",
     "use.scale": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured.",
     "use.temperature-assumed": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured, as temperature or thermal expansion of the pen are not stated. State both.",
     "discover.no-start": "No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.",
