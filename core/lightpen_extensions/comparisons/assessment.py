@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -218,12 +219,19 @@ CONCLUSION = "conclusion"
 
 
 def attributed(
-    record: Mapping[str, Any], names: Names, origin: Origin | None
+    record: Mapping[str, Any],
+    names: Names,
+    origin: Origin | None,
+    began: datetime | None = None,
 ) -> dict[str, Any]:
-    """Return the record of a verification with who made it where, of what."""
+    """Return the record of a verification with who made it where, of what.
+
+    The session began when the record was made, unless stated.
+    """
+    session = None if began is None else began.isoformat(timespec="seconds")
     return {
         **record,
-        "session": record["created"],
+        "session": session or record["created"],
         "station": names.station,
         "operator": names.operator,
         "pen": names.pen,

@@ -22,12 +22,12 @@ from lightpen.formats.opened_files import InputFile, all_hashed, hashed
 from lightpen.formats.own_json import file_entry, plain, record_heading
 from lightpen.model.names import Origin
 from lightpen.record.folder import TrialOutcome
-from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen_extensions.comparisons.assessment import (
     CONCLUSION,
     VerificationAssessment,
+    attributed,
     conditions_entries,
     keep_verification,
     verification_record,
@@ -35,7 +35,7 @@ from lightpen_extensions.comparisons.assessment import (
 )
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.sources import PenCameras
-from lightpen_extensions.measure.session import SessionSetup, VerificationStatus
+from lightpen_extensions.measure.session import VerificationStatus
 from lightpen_extensions.measure.storage.session_record import (
     DAMAGED,
     WHAT,
@@ -52,44 +52,26 @@ from lightpen_extensions.measure.tasks.task import rule_of
 _logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Conclusion:
-    """The end of a verification."""
-
-    outcome: TrialOutcome
-    session: datetime  # when it began
-    at: datetime
-    found: VerificationAssessment | None = None  # the worst, if any
-
-
 def conclusion_record(
-    names: Names,
-    origin: Origin,
-    tip_file: InputFile,
-    conclusion: Conclusion,
+    of: VerificationCheckpoint,
+    outcome: TrialOutcome,
+    at: datetime,
     files: tuple[InputFile, ...],
+    found: VerificationAssessment | None = None,
 ) -> dict[str, Any]:
-    """Return the record of a conclusion on the result in ``tip_file``.
-
-    ``files`` are all records of the session.
-    """
-    found = conclusion.found
-    return {
-        **record_heading(conclusion.at),
+    """Return the record of a conclusion; ``files`` are all records of the session."""
+    tip_file = InputFile(Path(of.tip_file), of.tip_sha256)
+    record = {
+        **record_heading(at),
         "verification": CONCLUSION,
-        "outcome": conclusion.outcome,
-        "session": conclusion.session.isoformat(timespec="seconds"),
-        "station": names.station,
-        "operator": names.operator,
-        "pen": names.pen,
-        "tip": names.tip,
-        "origin": origin,
+        "outcome": outcome,
         "verdict": None
         if found is None
         else {"grade": found.grade.value, **plain(found.reason)},
         "inputs": {"tip": file_entry(tip_file)},
         "records": [file_entry(file) for file in files],
     }
+    return attributed(record, of.names, of.origin, of.began)
 
 
 def task_record(
@@ -102,16 +84,10 @@ def task_record(
     setup, state, tip = status.setup, status.state, status.tip
     if setup is None or state is None or state.found is None or tip is None:
         return None
-    task, names, limits = setup.task, tip.names, asdict(setup.choices.limits)
-    return verification_record(
+    task, limits = setup.task, asdict(setup.choices.limits)
+    record = verification_record(
         task.kind,
         {
-            "session": (status.began or now).isoformat(timespec="seconds"),
-            "station": names.station,
-            "operator": names.operator,
-            "pen": names.pen,
-            "tip": names.tip,
-            "origin": tip.origin,
             "camera_serials": camera_serials(tip.instrument),
             "remarks": list(tip.instrument.remarks),
             **conditions_entries(tip.temperature_c, tip.humidity_percent),
@@ -129,6 +105,7 @@ def task_record(
         },
         rule_of(setup.choices, setup.choices.limits),
     )
+    return attributed(record, tip.names, tip.origin, status.began or now)
 
 
 def camera_serials(instrument: Instrument) -> list[str]:
@@ -149,6 +126,7 @@ class PendingRecord:
     """A record to be written, after earlier ones of its session."""
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
+    files: list[Path]  # of its session, to which its own is added
     ends: SessionRecord | None = None  # that this record concludes
 
 
@@ -163,7 +141,7 @@ class SessionKeeping:
         self._now = now
         self.images = SessionRecord(begin)
         self._files: list[Path] = []  # of the current session
-        self._waiting: list[tuple[PendingRecord, list[Path]]] = []  # with its files
+        self._waiting: list[PendingRecord] = []
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -184,14 +162,19 @@ class SessionKeeping:
         """Have the result of a complete task written, now or as soon as it can be."""
         record = task_record(status, self._now(), self.images.journal)
         if record is not None:
-            self._queue(PendingRecord(lambda _: record))
+            self._waiting.append(PendingRecord(lambda _: record, self._files))
 
     def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
         """Write the outcome of the verification with all its records."""
-        tip, began = status.tip, status.began
-        if tip is not None and began is not None:
-            conclusion = Conclusion(outcome, began, self._now(), status.assessment)
-            self._queue(_concluding(tip, conclusion, self.images))
+        now, of, found = self._now(), self._checkpoint(status), status.assessment
+        if of is not None:
+            self._waiting.append(
+                PendingRecord(
+                    lambda files: conclusion_record(of, outcome, now, files, found),
+                    self._files,
+                    self.images,
+                )
+            )
 
     def give_up(self, status: VerificationStatus) -> None:
         """Conclude an incomplete session, as another begins."""
@@ -201,28 +184,27 @@ class SessionKeeping:
 
     def begin(self) -> None:
         """Begin another session."""
-        if not any(kept.ends is self.images for kept, _ in self._waiting):
+        if not any(kept.ends is self.images for kept in self._waiting):
             self.images.release()
         self._files, self.images = [], SessionRecord(self._begin)
 
     def release(self) -> None:
         """Close the images of sessions whose records could not be written."""
-        for kept, _ in self._waiting:
+        for kept in self._waiting:
             if kept.ends is not None:
                 kept.ends.release()
 
     def write(self) -> None:
         """Write pending records; what cannot be written stays pending."""
         while self._waiting:
-            self._write(*self._waiting[0])
+            self._write(self._waiting[0])
             self._waiting.pop(0)
 
     def note(self, status: VerificationStatus) -> None:
         """Write the checkpoint from which the verification can be resumed."""
-        tip, setup = status.tip, status.setup
-        if tip is None or setup is None or status.began is None or status.is_done:
-            return
-        self.images.note(_checkpoint(tip, setup, status.began, self.images.n_runs))
+        checkpoint = self._checkpoint(status)
+        if checkpoint is not None and not status.is_done:
+            self.images.note(checkpoint)
 
     def take_over(self, path: Path, before: ResumedVerification) -> None:
         """Continue an interrupted verification, unless another window has it."""
@@ -230,46 +212,32 @@ class SessionKeeping:
         self.images = SessionRecord.resume(path, n_runs, self._begin)
         self._files = list(before.files)
 
-    def _queue(self, kept: PendingRecord) -> None:
-        self._waiting.append((kept, self._files))
-
-    def _write(self, kept: PendingRecord, files: list[Path]) -> None:
+    def _write(self, kept: PendingRecord) -> None:
         """Write a record, after the files of its session before it."""
-        record = kept.record_of(all_hashed(files))
+        record = kept.record_of(all_hashed(kept.files))
         is_simulated = record["origin"] == Origin.SIMULATED
         file = keep_verification(self._data, record, is_simulated=is_simulated)
-        files.append(file)
+        kept.files.append(file)
         _logger.info("verification written: %s", file)
         if kept.ends is not None:
             kept.ends.close()
 
-
-def _concluding(
-    tip: CurrentTip, conclusion: Conclusion, ends: SessionRecord | None
-) -> PendingRecord:
-    """Return the record of a conclusion, to be written when its session is."""
-    return PendingRecord(
-        lambda files: conclusion_record(
-            tip.names, tip.origin, tip.tip_file, conclusion, files
-        ),
-        ends=ends,
-    )
-
-
-def _checkpoint(
-    tip: CurrentTip, setup: SessionSetup, began: datetime, n_runs: int
-) -> VerificationCheckpoint:
-    return VerificationCheckpoint(
-        began=began,
-        names=tip.names,
-        origin=tip.origin,
-        tip_file=tip.tip_file.path.name,
-        tip_sha256=tip.tip_file.sha256,
-        pen_sha256=tip.pen_file.sha256,
-        seen_by=tip.viewers.hashes,
-        choices=setup.choices,
-        n_runs=n_runs,
-    )
+    def _checkpoint(self, status: VerificationStatus) -> VerificationCheckpoint | None:
+        """Return how far a verification is; None before its first image."""
+        tip, setup, began = status.tip, status.setup, status.began
+        if tip is None or setup is None or began is None:
+            return None
+        return VerificationCheckpoint(
+            began=began,
+            names=tip.names,
+            origin=tip.origin,
+            tip_file=tip.tip_file.path.name,
+            tip_sha256=tip.tip_file.sha256,
+            pen_sha256=tip.pen_file.sha256,
+            seen_by=tip.viewers.hashes,
+            choices=setup.choices,
+            n_runs=self.images.n_runs,
+        )
 
 
 def abandon_interrupted(
@@ -292,13 +260,7 @@ def abandon_interrupted(
         for name in written_since(root, under_way):
             with suppress(FileError):
                 files.append(hashed(root / name))
-        record = conclusion_record(
-            under_way.names,
-            under_way.origin,
-            InputFile(Path(under_way.tip_file), under_way.tip_sha256),
-            Conclusion(TrialOutcome.ABANDONED, under_way.began, now),
-            tuple(files),
-        )
+        record = conclusion_record(under_way, TrialOutcome.ABANDONED, now, tuple(files))
         is_simulated = under_way.origin is Origin.SIMULATED
         keep_verification(data, record, is_simulated=is_simulated)
         remove_note(path)
