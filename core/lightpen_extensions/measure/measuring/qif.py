@@ -7,6 +7,7 @@ angular ones that name what is measured.
 """
 
 from collections.abc import Sequence
+from itertools import count
 from uuid import uuid4
 from xml.etree import ElementTree as ET
 
@@ -22,9 +23,10 @@ from lightpen_extensions.measure.measuring.part import (
     MeasuredPart,
 )
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
+from lightpen_resources import RESOURCES
 
 NAMESPACE = "http://qifstandards.org/xsd/qif3"
-VERSION = "3.0.0"
+STANDARD_ID = "1"
 PARTS = ("Definition", "Nominal", "Item", "Measurement")  # of a characteristic
 N_DECIMALS = 12
 STATUS = {
@@ -38,44 +40,36 @@ STATUS = {
 def qif_text(part: MeasuredPart) -> str:
     """Return a QIF document with the characteristics of a part."""
     n, n_features = len(part.results), len(part.features)
-    last_id = 4 * n + n_features + 2
-    ids = iter(range(1, last_id + 1))
-    root = ET.Element(
-        "QIFDocument",
-        {"xmlns": NAMESPACE, "versionQIF": VERSION, "idMax": str(last_id)},
-    )
-    _text(root, "QPId", str(uuid4()))
-    application = ET.SubElement(ET.SubElement(root, "Header"), "Application")
-    _text(application, "Name", f"Lightpen {__version__}")
-    _text(application, "Organization", "Lightpen")
-    standard_id = str(next(ids))
-    standards = ET.SubElement(root, "StandardsDefinitions", {"n": "1"})
-    standard = ET.SubElement(standards, "Standard", {"id": standard_id})
-    body = ET.SubElement(standard, "Organization")
-    _text(body, "StandardsOrganizationEnum", "ISO")
-    _text(standard, "Designator", "1101")
-    _text(standard, "Year", "2017")
-    _add_units(root)
+    ids = map(str, count(2))  # after that of the standard
+    root = ET.parse(RESOURCES / "plans" / "results.qif").getroot()
+    root.set("xmlns", NAMESPACE)
+    root.set("idMax", str(4 * n + n_features + 2))
+    for place, text in (
+        ("QPId", str(uuid4())),
+        ("Header/Application/Name", f"Lightpen {__version__}"),
+    ):
+        for each in root.iterfind(place):
+            each.text = text
     results = ET.Element("Results")
     of_set = ET.SubElement(results, "MeasurementResultsSet", {"n": "1"})
     if n:
         characteristics = ET.SubElement(root, "Characteristics")
-        _text(characteristics, "FormalStandardId", standard_id)
+        _text(characteristics, "FormalStandardId", STANDARD_ID)
         definitions, nominals, items = (
             ET.SubElement(characteristics, f"Characteristic{each}", {"n": str(n)})
             for each in ("Definitions", "Nominals", "Items")
         )
     root.append(results)
-    one = ET.SubElement(of_set, "MeasurementResults", {"id": str(next(ids))})
+    one = ET.SubElement(of_set, "MeasurementResults", {"id": next(ids)})
     of_features = ET.SubElement(one, "MeasuredFeatures", {"n": str(n_features)})
     for name, feature in part.features.items():
-        _add_feature(of_features, name, feature, part, str(next(ids)))
+        _add_feature(of_features, name, feature, part, next(ids))
     if n:
         measured = ET.SubElement(one, "MeasuredCharacteristics")
         group = ET.SubElement(measured, "CharacteristicMeasurements", {"n": str(n)})
         parents = (definitions, nominals, items, group)
         for result in part.results:
-            own = [str(next(ids)) for _ in parents]
+            own = [next(ids) for _ in parents]
             _add_characteristic(parents, result, own)
     status = ET.SubElement(one, "InspectionStatus")
     _text(status, "InspectionStatusEnum", _overall(part))
@@ -99,19 +93,6 @@ def _text(parent: ET.Element, name: str, text: str) -> ET.Element:
     element = ET.SubElement(parent, name)
     element.text = text
     return element
-
-
-def _add_units(root: ET.Element) -> None:
-    primary = ET.SubElement(ET.SubElement(root, "FileUnits"), "PrimaryUnits")
-    for kind, si, name, factor in (
-        ("AngularUnit", "radian", "degree", float(np.pi / 180)),
-        ("LinearUnit", "meter", "mm", 0.001),
-    ):
-        unit = ET.SubElement(primary, kind)
-        _text(unit, "SIUnitName", si)
-        _text(unit, "UnitName", name)
-        conversion = ET.SubElement(unit, "UnitConversion")
-        _text(conversion, "Factor", _number(factor))
 
 
 def _add_characteristic(

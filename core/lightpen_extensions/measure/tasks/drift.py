@@ -35,7 +35,6 @@ from lightpen_extensions.measure.measuring.report import ResultRow, ResultTable
 from lightpen_extensions.measure.tasks.fixed_point import (
     ELSEWHERE,
     LIFTED,
-    elsewhere,
     without_others,
 )
 from lightpen_extensions.measure.tasks.probed_point import joint_covariance
@@ -159,7 +158,7 @@ def _screen(progress: TaskProgress) -> Screening:
         return Screening(kept, message("session.other-than-first"))
     distance = float(np.linalg.norm(last.point_cam - first.point_cam))
     if distance > ELSEWHERE:
-        return Screening(kept, elsewhere(distance))
+        return Screening(kept, message("session.elsewhere", distance=distance))
     return without_others(points, LIFTED)
 
 

@@ -58,7 +58,6 @@ from lightpen_extensions.measure.tasks.task import (
     Screening,
     VerificationChoices,
     VerificationTask,
-    keep_all,
 )
 
 BY_CHANCE = 0.01  # probability that a correct tip looks wrong
@@ -345,13 +344,10 @@ def without_others(
     distances = np.linalg.norm(places - np.median(places, axis=0), axis=1)
     kept = np.flatnonzero(distances <= limit).tolist()
     if len(points) < 3 or len(kept) == len(points):  # of two, either may be wrong
-        return keep_all(len(points))
-    return Screening(kept, elsewhere(float(distances.max())))
-
-
-def elsewhere(distance: float) -> Message:
-    """Reject a point at this distance from the others, mm."""
-    return message("session.elsewhere", distance=distance)
+        return Screening(range(len(points)))
+    return Screening(
+        kept, message("session.elsewhere", distance=float(distances.max()))
+    )
 
 
 def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:

@@ -109,11 +109,6 @@ class Screening:
     fault: Message | None = None
 
 
-def keep_all(count: int) -> Screening:
-    """Accept all points."""
-    return Screening(range(count))
-
-
 @dataclass(frozen=True)
 class HandGoal:
     """Goal of a simulated operator for the next point."""
@@ -152,8 +147,8 @@ class VerificationTask(Generic[FoundT]):
     n_frames: Callable[[VerificationChoices], int] = lambda choices: choices.n_frames
     other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[VerificationChoices], int] = lambda _: 1
-    screen: Callable[[TaskProgress], Screening] = lambda progress: keep_all(
-        len(progress.points)
+    screen: Callable[[TaskProgress], Screening] = lambda progress: Screening(
+        range(len(progress.points))
     )
     # What must be entered before, by choices and ball diameter
     missing: Callable[[VerificationChoices, float | None], Message | None] = (
