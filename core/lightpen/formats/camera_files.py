@@ -54,13 +54,15 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_layouts import (
+from lightpen.formats.camera_checks import (
     check_fold,
     check_pinhole,
     check_skew,
     check_window,
     checked_distortion,
     checked_size,
+)
+from lightpen.formats.camera_layouts import (
     colmap_tree,
     foreign_intrinsics,
     refuse_foreign,

@@ -33,8 +33,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
+from lightpen.formats.camera_checks import check_window
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.camera_layouts import check_window
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, is_covariance
 from lightpen.formats.files import (

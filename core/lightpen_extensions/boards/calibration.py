@@ -13,7 +13,7 @@ from datetime import date
 import numpy as np
 
 from lightpen.errors import CalibrationError
-from lightpen.formats.camera_layouts import LARGEST_FOLD
+from lightpen.formats.camera_checks import LARGEST_FOLD
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import normal_quantile

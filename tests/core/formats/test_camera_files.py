@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.camera_checks import LARGEST_FOLD
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
-from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera, LensModel, unmodelled_effects_of
 from lightpen.model.fisheye import LensField

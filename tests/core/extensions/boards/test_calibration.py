@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpen.errors import CalibrationError
-from lightpen.formats.camera_layouts import LARGEST_FOLD
+from lightpen.formats.camera_checks import LARGEST_FOLD
 from lightpen.model.camera import Camera
 from lightpen_extensions.boards.calibration import (
     MIN_VIEWS,

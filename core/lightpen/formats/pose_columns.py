@@ -1,0 +1,284 @@
+"""Recognise rotation and translation among the columns of other programs' poses.
+
+===================== ==============================================================
+Lightpen              ``r11`` to ``r33``, ``tx_mm ty_mm tz_mm``
+quaternions           names end in w x y z (or q0 to q3), as of NDI Track, Motive,
+                      EuRoC, ROS and many loggers; ``tx``, ``position.x``, ``p_x``
+rotation vectors      ``rvec_x``, ``rodrigues.y``, in radians, as of OpenCV
+matrices              ``m00`` to ``m33`` or ``m11`` to ``m44``; or 16 columns, 4
+                      columns with 4 rows a pose, or 12 columns, without names
+TUM, 7 or 8 columns   time, three coordinates and a quaternion in any order
+===================== ==============================================================
+
+Where names do not tell it, the order is the one whose poses leave the least scatter
+of a tip that rests at one place.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.pen_tables import UNIT_NAMES, UNITS
+from lightpen.formats.tables import Table
+from lightpen.messages import printable
+
+FEW_POSES = 4
+UNIT_TOLERANCE = 0.01  # of the length of a quaternion
+
+_UNIT = (
+    rf"(?:(?:[\s_.]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
+    r"|\s*[\[(]([^\])]*)[\])])$"
+)
+_ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
+_MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
+_SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}
+_VECTORS = {"rvec", "rotvec", "rodrigues"}
+_ANGLE = r"(euler_?|rot_?)?(roll|pitch|yaw|r?[xyz]|[abc])([\W_]+(deg|rad)\w*\W?)?"
+_ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
+STATE = r".*(state|status|valid|visible|visibility|tracked).*"
+_FLAG = r"valid|visib|tracked"  # 0 says no; as a state, it may say that all is well
+_LOST = (
+    r"(?i)(missing|invalid|lost|disabled|occluded|false|not|no\b|bad|fail|error|out"
+    r"|untracked|unknown|nan).*"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ToolColumns:
+    """Columns of one tool: its rotation in one of three forms, translation, state."""
+
+    name: str
+    translation: tuple[int, ...]  # x, y, z
+    quaternion: tuple[int, ...] = ()  # w, x, y, z
+    vector: tuple[int, ...] = ()  # x, y, z, rad
+    matrix: tuple[int, ...] = ()  # row by row
+    state: int | None = None
+    unit: float | None = None  # mm, of the translation
+
+
+@dataclass(frozen=True)
+class _Role:
+    kind: str  # "q", "v" or "t"
+    axis: str
+    unit: float | None
+    tool: str
+
+
+def tools_of(table: Table) -> list[ToolColumns]:
+    """Return the tools that the header of a table names."""
+    roles = [_role(name) for name in table.header]
+    for name, role in zip(table.header, roles, strict=True):
+        stated = re.search(_UNIT, name)
+        if role is not None and role.kind == "t" and stated and stated[2]:
+            unit = printable(stated[2])
+            raise FileError("poses.unit", name=table.name, unit=unit)
+    matrix = _matrix(table.header)
+    if matrix is not None:
+        return [matrix]
+    known = [i for i, role in enumerate(roles) if role is not None]
+    if not known:
+        return []
+    first = roles[known[0]]
+    assert first is not None
+    starts = [
+        i
+        for i, role in enumerate(roles)
+        if role is not None and (role.kind, role.axis) == (first.kind, first.axis)
+    ]
+    tools = []
+    before = 0
+    for start, end in zip(starts, [*starts[1:], len(roles)], strict=True):
+        tool = _tool(table, roles, range(start, end), range(before, start))
+        tools += [] if tool is None else [tool]
+        before = start
+    return tools
+
+
+def is_lost(state: str, column: str = "") -> bool:
+    """Return whether the state of a tool, in this column, says that it was not seen."""
+    is_flag = re.search(_FLAG, column) is not None
+    return bool(re.fullmatch(_LOST, state) or (is_flag and state in ("0", "0.0")))
+
+
+def _role(name: str) -> _Role | None:
+    stated = re.search(_UNIT, name)
+    base = re.sub(_UNIT, "", name).strip()
+    unit = UNITS[UNIT_NAMES[stated[1]]] if stated and stated[1] else None
+    stem, axis = re.sub(r"[^a-z0-9]+$", "", base[:-1]), base[-1:]
+    words = set(re.findall(r"[a-z]+", stem))
+    tool = re.sub(r"[\W_]*(" + "|".join(_ROTATING | _MOVING) + r")$", "", stem)
+    if words & _VECTORS and axis in {*"xyz"}:
+        return _Role("v", axis, unit, tool)
+    if words & _ROTATING and axis in {*"wxyz", *_SCALARS}:
+        return _Role("q", _SCALARS.get(axis, axis), unit, tool)
+    if axis in {*"xyz"} and (words & _MOVING or not words):
+        return _Role("t", axis, unit, tool)
+    return _Role("q", "w", unit, tool) if base == "w" else None
+
+
+def _tool(
+    table: Table, roles: Sequence[_Role | None], own: range, before: range
+) -> ToolColumns | None:
+    """Return the tool of a block of columns; None if they are no whole pose."""
+    places: dict[tuple[str, str], int] = {}
+    moving = [i for i in own if (role := roles[i]) is not None and role.kind == "t"]
+    is_moved = not all(_is_bare(table, i) for i in moving)
+    for i in own:
+        role = roles[i]
+        if role is not None:
+            key = role.kind, role.axis
+            if role.kind == "t" and is_moved and _is_bare(table, i):
+                # Beside tx ty tz, bare names w x y z are the quaternion.
+                key = "q", role.axis
+            places.setdefault(key, i)
+    quaternion = [places.get(("q", axis)) for axis in "wxyz"]
+    vector = [places.get(("v", axis)) for axis in "xyz"]
+    translation = [places.get(("t", axis)) for axis in "xyz"]
+    if None in translation or (None in quaternion and None in vector):
+        angles = [name for name in table.header if re.fullmatch(_ANGLE, name)]
+        if None not in translation and (None not in quaternion[1:] or len(angles) > 2):
+            raise FileError("poses.angles", name=table.name)
+        return None
+    role = roles[translation[0] or 0]
+    state = [i for i in before if re.fullmatch(STATE, table.header[i])][-1:]
+    state += [i for i in own if re.fullmatch(STATE, table.header[i])][:1]
+    return ToolColumns(
+        name=_name(table, before, role.tool if role is not None else ""),
+        translation=tuple(i for i in translation if i is not None),
+        quaternion=tuple(i for i in quaternion if i is not None),
+        vector=tuple(i for i in vector if i is not None),
+        state=state[0] if state else None,
+        unit=None if role is None else role.unit,
+    )
+
+
+def _is_bare(table: Table, column: int) -> bool:
+    return len(re.sub(_UNIT, "", table.header[column]).strip()) == 1
+
+
+def _name(table: Table, before: range, prefix: str) -> str:
+    """Return the name of a tool by its port, or by the names of its columns."""
+    ports = [i for i in before if table.header[i].startswith("port")]
+    if not ports:
+        return prefix
+    cell = table.rows[0][ports[-1]]
+    header = table.header[ports[-1]]
+    return cell if ":" not in header and not cell.isdecimal() else header
+
+
+def _matrix(header: Sequence[str]) -> ToolColumns | None:
+    """Return the columns of a matrix by names such as ``r11`` and ``m03``."""
+    found: dict[tuple[int, int], int] = {}
+    for i, name in enumerate(header):
+        element = re.fullmatch(_ELEMENT, name)
+        if element:
+            found.setdefault((int(element[1]), int(element[2])), i)
+    if not found:
+        return None
+    least = min(min(found))
+    rows = range(least, least + 3)
+    last = least + 3
+    matrix = [found.get((i, j)) for i in rows for j in rows]
+    moved = [found.get((i, last)) for i in rows]
+    unit = None
+    if None in moved:
+        roles = [_role(name) for name in header]
+        places = {r.axis: i for i, r in enumerate(roles) if r and r.kind == "t"}
+        moved = [places.get(axis) for axis in "xyz"]
+        units = [r.unit for r in roles if r and r.kind == "t"]
+        unit = units[0] if units else None
+    if None in matrix or None in moved:
+        return None
+    state = [i for i, name in enumerate(header) if re.fullmatch(STATE, name)]
+    return ToolColumns(
+        name="",
+        translation=tuple(i for i in moved if i is not None),
+        matrix=tuple(i for i in matrix if i is not None),
+        state=state[0] if state else None,
+        unit=unit,
+    )
+
+
+def rotations_of_quaternions(quaternions: FloatArray) -> FloatArray:
+    """Return rotations (N, 3, 3) of quaternions (N, 4), w x y z; NaN of none."""
+    from scipy.spatial.transform import Rotation  # takes 0.2 s
+
+    matrices = np.full((len(quaternions), 3, 3), np.nan)
+    good = np.abs(np.linalg.norm(quaternions, axis=1) - 1) < UNIT_TOLERANCE
+    if good.any():
+        turned = np.roll(quaternions[good], -1, axis=1)
+        matrices[good] = Rotation.from_quat(turned).as_matrix()
+    return matrices
+
+
+def rotations_of_vectors(vectors: FloatArray) -> FloatArray:
+    """Return rotations (N, 3, 3) of rotation vectors (N, 3), rad; NaN of none."""
+    from scipy.spatial.transform import Rotation  # takes 0.2 s
+
+    matrices = np.full((len(vectors), 3, 3), np.nan)
+    good = np.isfinite(vectors).all(axis=1)
+    matrices[good] = Rotation.from_rotvec(vectors[good]).as_matrix()
+    return matrices
+
+
+def scatter(rotations: FloatArray, translations: FloatArray) -> float:
+    """Return the median distance of the tips of poses from where they rest, mm.
+
+    By linear least squares of ``R tip + t = pivot``; infinite with too few poses.
+    """
+    good = np.isfinite(rotations).all(axis=(1, 2)) & np.isfinite(translations).all(1)
+    R, t = rotations[good], translations[good]
+    if len(R) < FEW_POSES:
+        return np.inf
+    design = np.concatenate([R, -np.tile(np.eye(3), (len(R), 1, 1))], axis=2)
+    solution = np.linalg.lstsq(design.reshape(-1, 6), -t.ravel(), rcond=None)[0]
+    off = design @ solution + t
+    return float(np.median(np.linalg.norm(off, axis=1)))
+
+
+def without_names(values: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return rotations and translations of columns (N, k) without names.
+
+    Raises `FileError` if they are no poses of a known layout.
+    """
+    candidates: list[tuple[FloatArray, FloatArray]] = []
+    n_columns = values.shape[1]
+    if n_columns == 4 and len(values) % 4 == 0:
+        values = values.reshape(-1, 16)
+        n_columns = 16
+    for skipped in range(min(n_columns, 3)):
+        own = values[:, skipped:]
+        if own.shape[1] == 16:
+            matrices = own.reshape(-1, 4, 4)
+            candidates += [
+                (each[:, :3, :3], each[:, :3, 3])
+                for each in (matrices, np.swapaxes(matrices, 1, 2))
+                if np.nanmax(np.abs(each[:, 3] - [0, 0, 0, 1]), initial=0) < 1e-6
+            ]
+        elif own.shape[1] == 12:
+            matrices = own.reshape(-1, 3, 4)
+            candidates.append((own[:, :9].reshape(-1, 3, 3), own[:, 9:]))
+            candidates.append((matrices[..., :3], matrices[..., 3]))
+        elif own.shape[1] == 7:
+            for q, t in ((own[:, 3:], own[:, :3]), (own[:, :4], own[:, 4:])):
+                candidates += [
+                    (rotations_of_quaternions(np.roll(q, turn, 1)), t)
+                    for turn in (0, 1)
+                ]
+    good = [each for each in candidates if are_rotations(each[0])]
+    if not good:
+        raise FileError("poses.no-header", name=name, n_columns=values.shape[1])
+    return min(good, key=lambda each: scatter(*each))
+
+
+def are_rotations(matrices: FloatArray) -> bool:
+    """Return whether most matrices that are given are rotations."""
+    given = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+    if not len(given) or np.abs(given).max() > 1e3:
+        return False
+    off = np.abs(given @ np.swapaxes(given, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    return bool(np.median(off) < UNIT_TOLERANCE)
