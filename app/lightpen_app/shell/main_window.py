@@ -4,14 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import (
-    QAction,
-    QCloseEvent,
-    QIcon,
-    QKeyEvent,
-    QPaintEvent,
-    QShowEvent,
-)
+from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QPaintEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -49,7 +42,6 @@ LEAST_SIZE = QSize(98 * GRID, 60 * GRID)  # fits 800 x 600, and 1280 x 800 at 15
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 PAINTED_MS = 50  # after the first paint, before slow work starts
 OPTIONS = "options"  # cause of a notification
-ARROW_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
 
 
@@ -258,12 +250,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._on_advance_pressed()
         elif key == Qt.Key.Key_PageUp:
             self.go_back()
-        elif key in ARROW_KEYS and self.page().hasFocus():  # after a click
-            if not focus_first(self.page()):
-                self._action_bar.focus_main()
-            focused = QApplication.focusWidget()
-            if focused is not None and focused is not self.page():
-                QApplication.sendEvent(focused, event)
         else:
             super().keyPressEvent(event)
 
@@ -283,11 +269,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             page.shut_down()
         self.closing.emit()
         super().closeEvent(event)
-
-    @override
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self._area.last_input.follow(self.windowHandle())
 
     @override
     def changeEvent(self, event: QEvent) -> None:
@@ -424,7 +405,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return replace(action, why_not=self.tr("Answer the question first."))
 
     def _focus_page(self) -> None:
-        if not self._area.focus_page(self.page()):
+        if not focus_first(self.page()):
             self._action_bar.focus_main()
 
     def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:

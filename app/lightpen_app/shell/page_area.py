@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QDeadlineTimer, QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QWindow
-from PySide6.QtWidgets import QFrame, QLineEdit, QSizePolicy, QStackedWidget, QWidget
+from PySide6.QtCore import QDeadlineTimer, Qt, Signal
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QFrame, QSizePolicy, QStackedWidget, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import (
@@ -87,7 +87,6 @@ class PageArea(QFrame):
     def __init__(self, page: QWidget) -> None:
         super().__init__()
         self.setObjectName("page_area")
-        self.last_input = LastInput(self)
         self._room = SizeClass()
 
         # Widgets: the order of making them is the order of the Tab key
@@ -117,17 +116,6 @@ class PageArea(QFrame):
         for each in after:
             self.setTabOrder(last, each)
             last = each
-
-    def focus_page(self, page: Page) -> bool:
-        """Focus the control that a page chose, or its first; False without any.
-
-        Who uses the mouse sees no frame, but where text can be typed at once.
-        """
-        is_typed = isinstance(page.first_control(), QLineEdit)
-        if not self.last_input.is_pointer or is_typed:
-            return focus_first(page)
-        page.setFocus(Qt.FocusReason.OtherFocusReason)
-        return True
 
     def words(self) -> tuple[str, ...]:
         """Return the texts about the page."""
@@ -301,27 +289,3 @@ class _MainButton(PushButton):
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         event.accept()
-
-
-DEVICES = {
-    QEvent.Type.MouseButtonPress: True,
-    QEvent.Type.TouchBegin: True,
-    QEvent.Type.KeyPress: False,
-}
-
-
-class LastInput(QObject):
-    """Tells whether the last input of a window came from mouse or touch screen."""
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self.is_pointer = False
-
-    def follow(self, window: QWindow) -> None:
-        """Follow the input of a window."""
-        window.installEventFilter(self)
-
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        self.is_pointer = DEVICES.get(event.type(), self.is_pointer)
-        return False

@@ -71,7 +71,6 @@ class StateBanner(QWidget):
         super().__init__()
         self._value = State()
         self._long_height = 0  # px; 0 while the sentence is short
-        self._detail_px = 0.0
         self._speaks = speaks
         self._speaking = QTimer(self, singleShot=True)
         self._word_size = word_size
@@ -197,10 +196,6 @@ class StateBanner(QWidget):
         painter.setPen(pen)
         painter.drawArc(place, 90 * 16, round(-360 * 16 * fraction))
 
-    def detail_px(self) -> float:
-        """Return the present font size of the sentence, px."""
-        return self._detail_px
-
     def _draw_words(self, painter: QPainter, box: QRectF, ink: QColor) -> None:
         state = self._value
         painter.setPen(ink)
@@ -220,7 +215,6 @@ class StateBanner(QWidget):
             size = fitted_size(
                 detail, detail_box, self._detail_size, bold=False, flags=wrapped
             )
-            self._detail_px = size
             painter.setFont(font(size))
             painter.drawText(detail_box, wrapped, detail)
 

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.arrays import FloatArray
@@ -22,7 +21,7 @@ from lightpen_app.look.words import shortened
 from lightpen_app.work.job import LatestJob, Notifications, Report
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection
-from lightpen_app.work.settings import CameraFiles, Settings, Triple
+from lightpen_app.work.settings import CameraFiles, Settings, circles_of, mask_of
 
 _logger = logging.getLogger(__name__)
 
@@ -199,12 +198,12 @@ class FilesOfCameras(QObject):
             self._refuse(file, owner, serials[0])
             return
         self._notifications.withdraw(self)
-        files = CameraFiles(str(file.path), file.sha256, _circles(now.mask))
+        files = CameraFiles(str(file.path), file.sha256, circles_of(now.mask))
         self._settings.set_camera_files(serials[0], files)
 
     def _store_mask(self, serial: str, mask: FloatArray) -> None:
         files = self._settings.camera_files(serial)
-        self._settings.set_camera_files(serial, replace(files, mask=_circles(mask)))
+        self._settings.set_camera_files(serial, replace(files, mask=circles_of(mask)))
 
     def _refuse(self, file: CameraFile, owner: str, serial: str) -> None:
         words = self.tr(
@@ -221,9 +220,9 @@ class FilesOfCameras(QObject):
         self._job.cancel()
         own = [self._settings.camera_files(serial) for serial in serials]
         if own[0] != CameraFiles():
-            now = replace(now, mask=_array(own[0].mask))
+            now = replace(now, mask=mask_of(own[0].mask))
         if now.second is not None and len(own) > 1 and own[1] != CameraFiles():
-            now = replace(now, second=replace(now.second, mask=_array(own[1].mask)))
+            now = replace(now, second=replace(now.second, mask=mask_of(own[1].mask)))
         self._selection.observe(now)
         if len(serials) > 1:
             rig = self._settings.camera_files(_pair(serials)).file
@@ -273,13 +272,5 @@ def _pair(serials: tuple[str, ...]) -> str:
 
 
 def _kept(now: Preparation) -> tuple[object, ...]:
-    second = None if now.second is None else _circles(now.second.mask)
-    return now.camera_file, now.rig_file, _circles(now.mask), second
-
-
-def _circles(mask: FloatArray) -> tuple[Triple, ...]:
-    return tuple((x, y, radius) for x, y, radius in mask.tolist())
-
-
-def _array(mask: tuple[Triple, ...]) -> FloatArray:
-    return np.array(mask).reshape(-1, 3)
+    second = None if now.second is None else circles_of(now.second.mask)
+    return now.camera_file, now.rig_file, circles_of(now.mask), second

@@ -97,12 +97,12 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         names=replace(station.names, station=name),
         nominal_tip=None if tip is None else np.array(tip),
         source=camera.source if _is_known(camera) else NO_SOURCE,
-        second=SecondCamera(second.source, mask=_mask(second))
+        second=SecondCamera(second.source, mask=mask_of(second.mask))
         if second is not None and _is_known(second)
         else None,
         camera_file=None,
         pen_file=None,
-        mask=_mask(camera),
+        mask=mask_of(camera.mask),
         limits=station.limits,
         assumptions=station.assumptions,
         method=station.method,
@@ -121,10 +121,10 @@ def station_of(
     return Station(
         names=preparation.names,
         nominal_tip=None if tip is None else tuple(tip.tolist()),
-        camera=StoredCamera(preparation.source, _circles(preparation.mask)),
+        camera=StoredCamera(preparation.source, circles_of(preparation.mask)),
         second=None
         if second is None
-        else StoredCamera(second.source, _circles(second.mask)),
+        else StoredCamera(second.source, circles_of(second.mask)),
         files=FilePaths(
             unread.camera if camera_file is None else str(camera_file.path),
             unread.pen if pen_file is None else str(pen_file.path),
@@ -144,11 +144,13 @@ def _is_known(camera: StoredCamera) -> bool:
     return source_named(camera.source.kind) is not None
 
 
-def _mask(camera: StoredCamera) -> FloatArray:
-    return np.array(camera.mask).reshape(-1, 3)
+def mask_of(circles: tuple[Triple, ...]) -> FloatArray:
+    """Return stored circles of stray light as a mask (N, 3)."""
+    return np.array(circles).reshape(-1, 3)
 
 
-def _circles(mask: FloatArray) -> tuple[Triple, ...]:
+def circles_of(mask: FloatArray) -> tuple[Triple, ...]:
+    """Return a mask as it is stored."""
     return tuple((x, y, radius) for x, y, radius in mask.tolist())
 
 

@@ -367,25 +367,6 @@ def test_every_step_can_be_reached_and_pressed_by_keys_alone(
     assert shell.shown == "Camera"
 
 
-def test_after_a_click_a_new_page_frames_no_control_until_tab_is_pressed(
-    shell: Shell, press: Callable[[Key], None]
-) -> None:
-    main, handle = shell.main_button, shell.window.windowHandle()
-    at = main.mapTo(shell.window, main.rect().center())
-    QTest.mouseClick(handle, Qt.MouseButton.LeftButton, pos=at)
-    assert shell.shown == "Camera"
-    page = shell.pages[1]
-    assert QApplication.focusWidget() is page
-    press(Key.Key_Tab)
-    assert page.field.hasFocus()
-    page.setFocus()
-    press(Key.Key_Down)
-    assert page.field.hasFocus()
-
-    QTest.keyClick(handle, Key.Key_PageUp)
-    assert shell.pages[0].field.hasFocus()
-
-
 def test_b_mutes_but_can_be_typed(shell: Shell, press: Callable[[Key], None]) -> None:
     shell.pages[0].field.setFocus()
     press(Key.Key_B)

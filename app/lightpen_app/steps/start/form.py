@@ -70,9 +70,6 @@ class NamesForm(Translated, QWidget):
             self._nominal_tip, self.tr("Nominal tip centre")
         )
         choose = self.tr("Choose from the tip library, or open it (arrow down)")
-        self.say(self._lists[ItemKind.PEN], name=self.tr("List of pens"), tip=choose)
-        self.say(self._lists[ItemKind.TIP], name=self.tr("List of tips"), tip=choose)
-        self.say(self._lists[ItemKind.CONE], name=self.tr("List of cones"), tip=choose)
 
         # Layout
         vertical_layout(self, self._place, self._probe, spacing=2 * GRID)
@@ -82,13 +79,19 @@ class NamesForm(Translated, QWidget):
         probe = _panel(self._probe)
         tip_label = self.make_label(self._tip, self.tr("Probe tip"))
         pen_label = self.make_label(self._pen, self.tr("Pen serial number"))
-        for kind, label, edit, cell in (
-            (ItemKind.PEN, pen_label, self._pen, (0, 0)),
-            (ItemKind.CONE, self._cone_label, self._cone, (0, 1)),
-            (ItemKind.TIP, tip_label, self._tip, (1, 0)),
+        pens, tips = self.tr("List of pens"), self.tr("List of tips")
+        cones = self.tr("List of cones")
+        for kind, label, edit, name, cell in (
+            (ItemKind.PEN, pen_label, self._pen, pens, (0, 0)),
+            (ItemKind.CONE, self._cone_label, self._cone, cones, (0, 1)),
+            (ItemKind.TIP, tip_label, self._tip, tips, (1, 0)),
         ):
+            button = self.say(self._lists[kind], name=name, tip=choose)
             column = vertical_layout(probe, label, spacing=GRID // 2, at=cell)
-            horizontal_layout(column, (edit, 1), self._lists[kind], spacing=GRID // 2)
+            horizontal_layout(column, (edit, 1), button, spacing=GRID // 2)
+            button.chosen.connect(partial(self.item_chosen.emit, kind))
+            button.library_requested.connect(partial(self.library_requested.emit, kind))
+            edit.list_requested.connect(button.showMenu)
         ball, unknown = self.tr("Ball diameter"), self.tr("Not specified")
         self.make_field(probe, self._ball, ball, hint=unknown, at=(1, 1))
         add_labelled(probe, self._nominal_label, self._nominal_tip, at=(2, 0, 1, 2))
@@ -100,15 +103,6 @@ class NamesForm(Translated, QWidget):
         for each in self._edits:
             each.textEdited.connect(self.value_edited)
             each.editingFinished.connect(self.value_changed)
-        listed = {
-            ItemKind.PEN: self._pen,
-            ItemKind.TIP: self._tip,
-            ItemKind.CONE: self._cone,
-        }
-        for kind, button in self._lists.items():
-            button.chosen.connect(partial(self.item_chosen.emit, kind))
-            listed[kind].list_requested.connect(button.showMenu)
-            button.library_requested.connect(partial(self.library_requested.emit, kind))
         self._ball.value_changed.connect(self.ball_entered)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
 
