@@ -6,10 +6,9 @@ from typing import Any
 
 from typing_extensions import override
 
-from lightpen.cameras.protocol import Frame, FrameIncomplete, busy, lost
+from lightpen.cameras.protocol import Frame, FrameIncomplete, busy, lost, not_found
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import message
-from lightpen_extensions.drivers.device_camera import not_found
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator

@@ -63,10 +63,6 @@ def _run() -> int:
     return run(desktop=Launchers())
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 # Of objects that may be garbage, more than are imported. A search looks through all
 # that is there, and imports would bring a search at every 700 objects.
 SEARCH_AFTER = 100_000
@@ -80,3 +76,7 @@ def run_program(program: Callable[[], int]) -> int:
     status = program()
     gc.freeze()  # spares a search when the process ends
     return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -365,3 +365,8 @@ def busy(place: str) -> DeviceBusy:
 def lost(serial: str, why: str) -> DeviceLost:
     """Return the error of a camera that no longer responds."""
     return DeviceLost("camera.lost", serial=serial, why=why)
+
+
+def not_found(place: str, why: str = "") -> DeviceNotFound:
+    """Return the error of a camera that was not found."""
+    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")

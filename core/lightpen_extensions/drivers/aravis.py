@@ -25,13 +25,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import DeviceNotFound, Range, busy, lost
+from lightpen.cameras.protocol import DeviceNotFound, Range, busy, lost, not_found
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import Message, message
 from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
-    not_found,
     setting_refused,
 )
 

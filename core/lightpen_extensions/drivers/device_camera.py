@@ -18,7 +18,6 @@ from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
     ConfigError,
-    DeviceNotFound,
     Frame,
     FrameIncomplete,
     FrameTimeout,
@@ -310,8 +309,3 @@ def in_sentences(
         raise setting_refused(serial, str(error)) from error
     except losses as error:
         raise lost(serial, str(error)) from error
-
-
-def not_found(place: str, why: str = "") -> DeviceNotFound:
-    """Return the error of a camera that was not found."""
-    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")

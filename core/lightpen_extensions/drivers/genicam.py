@@ -18,14 +18,13 @@ from typing import Any
 import numpy as np
 
 from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import DeviceNotFound, Range, busy
+from lightpen.cameras.protocol import DeviceNotFound, Range, busy, not_found
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import Message, message
 from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
     in_sentences,
-    not_found,
 )
 
 WRITE_ONLY, READ_WRITE = 2, 4  # of EAccessMode; a command is write-only

@@ -7,13 +7,12 @@ import cv2
 import numpy as np
 
 from lightpen.cameras.pairing import Clock
-from lightpen.cameras.protocol import Range, lost
+from lightpen.cameras.protocol import Range, lost, not_found
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import message
 from lightpen_extensions.drivers.device_camera import (
     DeliveredFrame,
     DeviceCamera,
-    not_found,
     setting_refused,
 )
 
