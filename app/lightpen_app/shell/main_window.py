@@ -119,7 +119,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._sidebar.options_chosen.connect(self._show_options)
         self._action_bar.main_pressed.connect(self._on_main_pressed)
         self._action_bar.back_pressed.connect(self.go_back)
-        self._options.value_changed.connect(self._on_options_changed)
+        self._options.value_changed.connect(self.preferences_changed)
+        self._options.value_changed.connect(
+            lambda chosen: self.operator_view.set_distance_m(chosen.distance_m)
+        )
         self._options.said.connect(self._action_bar.set_status)
         self._options.data_folder_chosen.connect(self._on_data_folder_chosen)
         self._options.log_requested.connect(self.log_requested)
@@ -127,7 +130,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             lambda: self._operator_action.setChecked(False)
         )
         self.operator_view.advance_requested.connect(self._on_remote_advance)
-        self.operator_view.pause_requested.connect(self._pause)
+        self.operator_view.pause_requested.connect(lambda: self.page().toggle_pause())
         self._notice.value_changed.connect(self.operator_view.set_notice)
         notifications.raised.connect(self._notice.show_text)
         notifications.withdrawn.connect(self._notice.drop)
@@ -348,17 +351,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._action(Qt.Key.Key_PageDown, self._on_advance_pressed),
             self._action(Qt.Key.Key_PageUp, self.go_back),
         )
-        self.addActions(
-            [
-                self._operator_action,
-                self._options.mute_action,
-                *self._hands_free_actions,
-            ]
-        )
-        self.operator_view.addActions(
-            [self._help_action, self._operator_action, self._options.mute_action]
-        )
-        self.help_window.addActions([self._operator_action, self._options.mute_action])
+        everywhere = [self._operator_action, self._options.mute_action]
+        self.addActions(everywhere)
+        self.operator_view.addActions([self._help_action, *everywhere])
+        self.help_window.addActions(everywhere)
 
     def _action(self, key: Qt.Key, slot: Callable[[], object]) -> QAction:
         action = QAction(self)
@@ -466,12 +462,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Press the button that has the focus; pause where none has."""
         button = _focused_button()
         if button is None:
-            self._pause()
+            self.page().toggle_pause()
         else:
             button.click()
-
-    def _pause(self) -> None:
-        self.page().toggle_pause()
 
     def _on_help_triggered(self) -> None:
         self.help_window.set_topic(self.page().key, self._options.value().language)
@@ -489,10 +482,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Emit whether live images can be seen now."""
         is_seen = not self.isMinimized() or self.operator_view.isVisible()
         self.attention_changed.emit(self.page().shows_images and is_seen)
-
-    def _on_options_changed(self, preferences: Preferences) -> None:
-        self.operator_view.set_distance_m(preferences.distance_m)
-        self.preferences_changed.emit(preferences)
 
     def _on_data_folder_chosen(self, words: str) -> None:
         self._notifications.notify(OPTIONS, words, Tone.ACTIVE)
