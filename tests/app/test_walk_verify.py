@@ -18,6 +18,7 @@ from lightpen.record.folder import VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice
+from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.fitting import FRAME
 from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
 from lightpen_extensions.comparisons.assessment import CONCLUSION
@@ -217,7 +218,8 @@ def test_a_verification_that_was_interrupted_is_closed_after_a_question(
     assert walker.tells(
         "Close this verification as abandoned? Its recorded data remains."
     )
-    walker.click("Close verification")
+    (question,) = (w for w in walker.seen() if isinstance(w, QuestionBar))
+    walker.click_on(walker.control("Close verification", question))
     walker.until(lambda: not walker.says("Interrupted: 1"))
 
     (conclusion,) = records(walker)
