@@ -95,7 +95,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
         self._area = PageArea(pages[0])
-        self._notice = self._area.notice
         self._action_bar = ActionBar()
         self.operator_view = OperatorView()
         self.operator_view.set_distance_m(preferences.distance_m)
@@ -131,9 +130,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         )
         self.operator_view.advance_requested.connect(self._on_remote_advance)
         self.operator_view.pause_requested.connect(lambda: self.page().toggle_pause())
-        self._notice.value_changed.connect(self.operator_view.set_notice)
-        notifications.raised.connect(self._notice.show_text)
-        notifications.withdrawn.connect(self._notice.drop)
+        self._area.notice.value_changed.connect(self.operator_view.set_notice)
+        notifications.raised.connect(self._area.notice.show_text)
+        notifications.withdrawn.connect(self._area.notice.drop)
         notifications.status_changed.connect(self._action_bar.set_status)
         self._sidebar.subject_changed.connect(self.operator_view.set_subject)
         for page in pages:
