@@ -123,6 +123,7 @@ class MatchControl(QObject):
         self.watch.start()
         self._live.show_pen()
         self._region()
+        self._turn_simulated_pen()
 
     def stop(self) -> None:
         """Stop; detect the pen in use again."""
@@ -130,6 +131,13 @@ class MatchControl(QObject):
         self.watch.stop()
         if not self._run.status.is_capturing:
             self._live.set_region(self._selection.preparation.region)
+            if self._live.operator is not None:
+                self._live.operator.hold()
+
+    def _turn_simulated_pen(self) -> None:
+        """Show a simulated pen from all sides, as an operator turns a real one."""
+        if self._is_shown and self._live.operator is not None:
+            self._live.operator.swing()
 
     def doubt(self) -> str:
         """Return why the file may belong to another pen; empty if it fits."""
@@ -184,6 +192,7 @@ class MatchControl(QObject):
             self.watch.add(shown.seen.spots)
 
     def _on_connection_changed(self) -> None:
+        self._turn_simulated_pen()
         if self._is_shown:
             self._live.show_pen()
             if self._live.worst_connection is not Connection.STREAMING:

@@ -37,6 +37,7 @@ from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.hand import HandActivity
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_pen
 
@@ -487,6 +488,19 @@ def test_a_covered_led_is_reported(
 
     seen.wait("LED 6 is not detected at its table position.")
     assert "9 of 10 LEDs" in seen.words
+
+
+@pytest.mark.slow
+def test_the_simulated_pen_turns_by_itself(
+    seen: "Seen", workbench: Workbench, small_scene: Scene
+) -> None:
+    camera = FaultyCamera(small_scene, workbench.around.clock)
+    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
+    seen.page.entered()
+    seen.wait("All LEDs fit their table positions")
+
+    seen.page.left()  # the swing finds the pen at rest
+    seen.until(lambda: camera.operator.doing is HandActivity.SEATED)
 
 
 def test_the_file_of_another_pen_is_used_after_a_question_only(
