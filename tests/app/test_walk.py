@@ -161,10 +161,11 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_says("READING")
     walker.until(lambda: bool(re.search(r"\d+ of 60 images loaded", page_text(walker))))
     assert not walker.tells("Tilt")
-    walker.until_says("Review")
+    walker.until(lambda: walker.main_button().text() == "Review")
     walker.until(walker.main_button().isEnabled)
     assert walker.n_inputs == n_inputs
-    walker.click("Review")
+    walker.click_on(walker.main_button())
+    walker.until_shows("Review")
     walker.until(walker.main_button().isEnabled)
 
     tip = read_out(walker).tip
