@@ -52,7 +52,7 @@ SAME_EVERYWHERE = {
     *("Mono", "LED", "LEDs", "px", "mm", "dB", "ms", "fx", "fy"),
     *("CSV", "JSON", "PNG", "OpenCV", "ROS", "Kalibr", "MATLAB"),
     *("Enter", "Space", "Delete", "Insert", "Home", "Shift", "Tab"),
-    *("Lightpen", "Qt"),
+    *("Lightpen", "Qt", "paper"),  # the last: the layout of the simulated pen
 }
 # A swing shown by the images of a recording has this truth, in the frame of its file.
 BEST_FIT = "tip_in_leds_csv_frame_bestfit"
