@@ -10,7 +10,7 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.swings import flat_pen, paper_pen
 
 FAN_ANGLE = np.radians(20)  # of a fanned column's discs from +z
-NEARLY = 2.0  # mm by which the near-symmetric pen misses its mirror image
+NEARLY = 2.0  # mm, largest misfit of the near-symmetric pen to its mirror image
 
 
 def six_led_pen() -> Pen:

@@ -302,20 +302,17 @@ def framed(pen: Pen, tip: FloatArray) -> tuple[Pen, FloatArray, FloatArray]:
     if order_of_paper(leds, leds.mean(axis=0) - tip) is not None:
         R, t = pen_frame_from_raw(leds)
     else:
-        R, t = frame_by(pen, 0, len(leds) - 1)
+        R, t = _frame_of(pen)
     return moved(pen, R, t), R, t
 
 
-def frame_by(pen: Pen, origin: int, along: int) -> tuple[FloatArray, FloatArray]:
-    """Return R, t of a frame with one LED as origin and y to another, by indices.
-
-    z, at right angles to y, is next to the normal of the discs.
-    """
-    y = _normalised(pen.leds[along] - pen.leds[origin])
+def _frame_of(pen: Pen) -> tuple[FloatArray, FloatArray]:
+    """Return R, t of the frame of a pen of another layout, see `framed`."""
+    y = _normalised(pen.leds[-1] - pen.leds[0])
     z = pen.normals.mean(axis=0)
     z = _normalised(z - (z @ y) * y)
     R = np.stack([np.cross(y, z), y, z])
-    return R, -R @ pen.leds[origin]
+    return R, -R @ pen.leds[0]
 
 
 def _normalised(vector: FloatArray) -> FloatArray:

@@ -119,7 +119,7 @@ class FieldComponent(NamedTuple):
 
     sigma: float  # standard deviation of maximum likelihood, px
     gain: float  # twice the log likelihood ratio to no field
-    # (k, k), prior of the unknowns by which a fit gives their average over the sizes.
+    # (k, k), prior covariance with which one fit equals the average over the sizes.
     covariance: FloatArray
     spread: FloatArray  # (k, k), covariance of the estimates by the sizes
 
