@@ -1851,7 +1851,7 @@
     </message>
     <message>
         <source>RMS / px</source>
-        <translation>均方根 / px</translation>
+        <translation>残差 / px</translation>
     </message>
     <message>
         <source>Distance between the detected LED and its table position in the live image / px</source>
