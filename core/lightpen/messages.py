@@ -1,11 +1,12 @@
 """Messages to the user: a code with values; the catalogue has the text.
 
-The core raises a message by its code; `lightpen.catalogue` holds its English template.
+The core raises a message by its code; ``messages.json`` holds its English template.
 The command line prints English; the wizard looks the template up in its language. A
 message names no command and no button, as both show it: each adds its own advice by the
 code. Stored messages keep code and values, so that they print in any language later.
 """
 
+import json
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,18 +14,22 @@ from enum import StrEnum, unique
 from pathlib import Path
 from typing import TypeAlias, Union
 
-from lightpen.catalogue import cameras, command_line, estimation, files, record
-
 Value: TypeAlias = Union[str, int, float, "Message", tuple["Message", ...]]
 Translate: TypeAlias = Callable[[str], str]
 
-# All templates that are shown in other languages; extensions add theirs by `update`.
-TRANSLATED = {
-    code: template
-    for area in (cameras, estimation, files, record)
-    for code, template in area.MESSAGES.items()
-}
-CATALOGUE: Mapping[str, str] = ChainMap(TRANSLATED, command_line.MESSAGES)
+TRANSLATED: dict[str, str] = {}  # templates that are shown in other languages, too
+_ENGLISH: dict[str, str] = {}  # those of the command line
+CATALOGUE: Mapping[str, str] = ChainMap(TRANSLATED, _ENGLISH)
+
+
+def add_messages(file: Path) -> None:
+    """Add the messages of a file: by language, code and template with named values."""
+    messages = json.loads(file.read_bytes())
+    TRANSLATED.update(messages["translated"])
+    _ENGLISH.update(messages["english"])
+
+
+add_messages(Path(__file__).with_suffix(".json"))
 
 
 def in_english(template: str) -> str:

@@ -1,8 +1,7 @@
 """Extensions of the program, one package each; they lean on `lightpen` alone."""
 
-from lightpen.catalogue import command_line
-from lightpen.messages import TRANSLATED
-from lightpen_extensions.catalogue import COMMAND_LINE, MESSAGES
+from pathlib import Path
 
-TRANSLATED.update(MESSAGES)
-command_line.MESSAGES.update(COMMAND_LINE)
+from lightpen.messages import add_messages
+
+add_messages(Path(__file__).with_name("messages.json"))

@@ -149,7 +149,7 @@ class StoredMessage(Struct, frozen=True):
     Attributes
     ----------
     code : str
-        Code of a template in `lightpen.catalogue`.
+        Code of a template in `messages.json`.
     values : mapping of str to StoredValue
         Values for the fields of the template; None for a value that is not finite.
     """

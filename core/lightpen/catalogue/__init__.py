@@ -1,1 +1,0 @@
-"""The message catalogue: code and English template, a module for each area."""
