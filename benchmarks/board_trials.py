@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -43,11 +44,6 @@ from lightpen_extensions.boards.distortion import FEW, fit_camera
 from lightpen_extensions.boards.effects import MixedFit, fit_effects
 from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.sightings import find_points
-from lightpen_extensions.boards.simulated_boards import (
-    expose_board,
-    render_board,
-    simulate_board_poses,
-)
 from lightpen_extensions.boards.start import BoardPoses, start_camera
 from lightpen_extensions.simulator.scenes import Sensor
 

@@ -13,6 +13,7 @@ from benchmarks.board_trials import Trial, run_trial
 from benchmarks.held_out_views import held_out_rows
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -26,11 +27,6 @@ from lightpen.model.limits import Assumptions
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import Views, observe_board
-from lightpen_extensions.boards.simulated_boards import (
-    expose_board,
-    render_board,
-    simulate_board_poses,
-)
 from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     paper_camera,

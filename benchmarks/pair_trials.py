@@ -19,6 +19,7 @@ from benchmarks.board_trials import (
     draw_uneven,
     observe_points,
 )
+from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -27,7 +28,6 @@ from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.pair import calibrate_pair
-from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 from lightpen_extensions.boards.start import BoardPoses
 
 OTHER = Camera(

@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.rig_files import read_rig
@@ -13,11 +14,6 @@ from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.boards.boards import parse_board
-from lightpen_extensions.boards.simulated_boards import (
-    expose_board,
-    render_board,
-    simulate_board_poses,
-)
 from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_program.extensions import main
 

@@ -36,8 +36,6 @@ from lightpen_app_extensions.boards.view import (
 )
 from lightpen_extensions.boards.boards import Board
 from lightpen_extensions.boards.calibration import MIN_VIEWS, CameraCalibration
-from lightpen_extensions.boards.simulated_boards import HeldBoard
-from lightpen_extensions.simulator.hand import SimulatedOperator
 
 SIDE_WIDTH = 48 * GRID
 LEAST_LIST = 28 * GRID  # px, of the views
@@ -143,7 +141,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:
         self._calibration.discard()
         self._capture.start(None)
-        self._hold_simulated(None)
         self._calibration.set_remark(StatusMessage)
         super().closeEvent(event)
 
@@ -167,19 +164,10 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _on_begin_clicked(self) -> None:
         if self._capture.state.sought is not None:
             self._capture.stop()
-            self._hold_simulated(None)
         elif not is_refusing(self):
             self._calibration.discard()
             self._calibration.set_remark(StatusMessage)
-            board = self._named_board()
-            self._capture.start(board)
-            self._hold_simulated(board)
-
-    def _hold_simulated(self, board: Board | None) -> None:
-        """Let a simulated operator hold the board in view, or the pen again."""
-        operator = self._live.operator
-        if isinstance(operator, SimulatedOperator):
-            operator.in_view = None if board is None else HeldBoard(board)
+            self._capture.start(self._named_board())
 
     def _named_board(self) -> Board | None:
         """Return the board of the fields, or report why there is none."""

@@ -304,12 +304,7 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or "Mono8"
         times = end - self._exposure * np.array([1.0, 0.5, 0.0])
         scene = _with_gain(self.scene, settings)
-        shown = self.operator.in_view
-        if shown is None:
-            image = render_plan(scene, self._image_plan(scene, seq, times))
-        else:
-            rng = np.random.default_rng([scene.seed, seq])
-            image = shown.image(scene.camera, scene.sensor, times[1], rng)
+        image = render_plan(scene, self._image_plan(scene, seq, times))
         return Frame(
             image=sealed(image),
             seq=seq,

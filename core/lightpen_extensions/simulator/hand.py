@@ -10,14 +10,12 @@ from enum import Enum, auto
 from functools import lru_cache, partial
 from math import inf
 from threading import Lock
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import FloatArray
 from lightpen.cameras.pairing import Clock
-from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     TREMOR,
     TREMOR_BAND,
@@ -135,15 +133,6 @@ SWUNG = TrackingMotion(gain=5.0, lag=0.078, top_speed=np.radians(60))
 ARM = TrackingMotion(gain=4.0, lag=0.0975, top_speed=300.0)
 
 
-class HeldView(Protocol):
-    """What an operator holds in view instead of the pen."""
-
-    def image(
-        self, camera: Camera, sensor: Sensor, now: float, rng: np.random.Generator
-    ) -> Image:
-        """Return its image at a time, s."""
-
-
 class HandActivity(Enum):
     """Activity of the operator in the last image."""
 
@@ -207,7 +196,6 @@ class SimulatedOperator:
         self._turn_tremor = Tremor(self._rng)
         self._tip_tremor = Tremor(self._rng)
         self._lock = Lock()
-        self.in_view: HeldView | None = None  # held in view instead of the pen
         self._wishes: list[_Wish] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)

@@ -14,6 +14,7 @@ from PySide6.QtCore import QSize, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
@@ -30,13 +31,6 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.boards.view import BoardView
 from lightpen_app_extensions.boards.window import BoardWindow
 from lightpen_extensions.boards.boards import Board, BoardKind, parse_board
-from lightpen_extensions.boards.simulated_boards import (
-    HeldBoard,
-    expose_board,
-    render_board,
-    simulate_board_poses,
-)
-from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Sensor
 
 if TYPE_CHECKING:
@@ -362,21 +356,3 @@ def test_a_calibration_that_is_cancelled_leaves_the_one_before(
     assert not progress.isVisible()
     assert (remark(window), views_listed(window)) == (before, 7)
     assert reported == []
-
-
-def test_a_simulated_operator_holds_the_board_while_views_are_captured(
-    window: BoardWindow, workbench: Workbench, qtbot: QtBot
-) -> None:
-    workbench.camera.open()
-    qtbot.waitUntil(lambda: workbench.live.operator is not None)
-    operator = workbench.live.operator
-    assert isinstance(operator, SimulatedOperator)
-    press(window, "Start")
-    assert isinstance(operator.in_view, HeldBoard)
-    assert operator.in_view.board == parse_board(BOARD)
-
-    press(window, "Stop")
-    assert operator.in_view is None
-    press(window, "Start")
-    window.close()
-    assert operator.in_view is None

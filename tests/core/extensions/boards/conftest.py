@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
@@ -11,7 +12,6 @@ from lightpen.model.ellipse import disc_centroids
 from lightpen_extensions.boards.adjustment import board_points
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.observing import Views
-from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 NOISE = 0.03  # px
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_boards import simulate_board_poses
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -16,7 +17,6 @@ from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import Views
-from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -12,7 +13,6 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.pair import PairCalibration, calibrate_pair
-from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))
 SHIFT = np.array([-120.0, 3.0, 12.0])

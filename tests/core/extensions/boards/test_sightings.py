@@ -7,6 +7,7 @@ from time import process_time
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_boards import expose_board, render_board
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
@@ -23,7 +24,6 @@ from lightpen_extensions.boards.sightings import (
     count_corners,
     find_points,
 )
-from lightpen_extensions.boards.simulated_boards import expose_board, render_board
 from lightpen_extensions.simulator.scenes import Sensor
 
 SMALL = Camera(

@@ -1,4 +1,3 @@
-import cv2
 import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
@@ -9,9 +8,6 @@ from lightpen.detection.pose import fit_poses
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera
-from lightpen_extensions.boards.boards import parse_board
-from lightpen_extensions.boards.sightings import find_points
-from lightpen_extensions.boards.simulated_boards import HELD_IMAGES, HELD_S, HeldBoard
 from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
@@ -233,44 +229,3 @@ def test_a_simulated_camera_loses_no_images_on_a_busy_computer() -> None:
     assert after.seq == before.seq + 1
     assert after.host_ts_ns - before.host_ts_ns > 99e9
     assert camera.stats().missed == 0
-
-
-def test_a_board_is_held_still_for_a_slow_reader_too() -> None:
-    clock = SkippingClock()
-    board = parse_board("chessboard:7x5:20")
-    camera = streaming_camera(clock=clock)
-    camera.operator.in_view = HeldBoard(board)
-    seen = []
-    for _ in range(HELD_IMAGES + 1):
-        (frame,) = read(camera, 1)
-        corners = find_points(frame.image, board)
-        assert corners is not None
-        seen.append(corners)
-        clock.wait(HELD_S)
-
-    moved = [float(np.abs(each - seen[0]).max()) for each in seen]
-    assert max(moved[:-1]) < 1  # px
-    assert moved[-1] > 10
-
-
-def test_a_board_is_held_in_view_in_many_poses_until_the_pen_is_again() -> None:
-    clock = SkippingClock()
-    board = parse_board("chessboard:7x5:20")
-    camera = streaming_camera(clock=clock)
-    camera.operator.in_view = HeldBoard(board)
-    K = np.array([[SMALL.fx, 0, SMALL.cx], [0, SMALL.fy, SMALL.cy], [0, 0, 1]])
-    seen = []
-    for _ in range(3):
-        frame = read(camera, 10)[-1]  # some were waiting
-        corners = find_points(frame.image, board)
-        assert corners is not None
-        _, turn, shift = cv2.solvePnP(board.points, corners, K, None)
-        projected = cv2.projectPoints(board.points, turn, shift, K, None)[0][:, 0]
-        assert np.sqrt(np.mean((projected - corners) ** 2)) < 0.1  # px
-        seen.append(corners)
-        clock.wait(HELD_S)
-
-    assert min(np.ptp(each) for each in np.diff(seen, axis=0)) > 10  # px
-    camera.operator.in_view = None
-    (frame,) = read(camera, 1)
-    assert find_points(frame.image, board) is None

@@ -1,4 +1,4 @@
-"""Images of calibration boards, and where an operator holds them."""
+"""Images of calibration boards, and poses in which they are seen."""
 
 from functools import lru_cache
 
@@ -24,8 +24,6 @@ FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the bo
 ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
 OUTER_MARGIN = 2.0  # squares or distances beyond the points, also in the image
 MAX_TRIES = 100
-N_HELD, HELD_S = 40, 2.0  # poses in which a board is held live; s of each
-HELD_IMAGES = 10  # and images of each, if these take longer
 MARGIN = 10  # px round what is seen of it
 
 
@@ -97,46 +95,6 @@ def _window(
     return slice(int(low[1]), min(int(high[1]), camera.height)), slice(
         int(low[0]), min(int(high[0]), camera.width)
     )
-
-
-@lru_cache(maxsize=1)
-def held_light(camera: Camera, board: Board, number: int) -> FloatArray:
-    """Return the light of a board that an operator holds, as `render_board`.
-
-    The poses are numbered; all differ, until they are repeated.
-    """
-    poses = _held_poses(camera, board)
-    at = number % len(poses.rotations)
-    pose = poses.rotations[at], poses.translations[at]
-    return render_board(camera, board, *pose, samples=1)
-
-
-class HeldBoard:
-    """A board that a simulated operator holds in view, in one pose after the other."""
-
-    def __init__(self, board: Board) -> None:
-        self.board = board
-        self._held = 0, 0  # number of the pose, and its images so far
-
-    def image(
-        self, camera: Camera, sensor: Sensor, now: float, rng: np.random.Generator
-    ) -> Image:
-        """Return its image at a time, s."""
-        light = held_light(camera, self.board, self._pose(now))
-        return expose_board(light, sensor, rng)
-
-    def _pose(self, now: float) -> int:
-        """Return the number of the pose; a slow reader sees it long enough."""
-        due, (number, n_images) = int(now / HELD_S), self._held
-        if not n_images or (due != number and n_images >= HELD_IMAGES):
-            number, n_images = due, 0
-        self._held = number, n_images + 1
-        return number
-
-
-@lru_cache(maxsize=1)
-def _held_poses(camera: Camera, board: Board) -> BoardPoses:
-    return simulate_board_poses(camera, board, N_HELD, np.random.default_rng(1))
 
 
 def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) -> Image:
