@@ -45,7 +45,7 @@ discover``) ``found_from``: an LED centre of each of these ``images``, px, and t
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -63,11 +63,14 @@ from lightpen.formats.camera_checks import (
     checked_size,
 )
 from lightpen.formats.camera_layouts import (
+    DISTORTION,
     colmap_tree,
     foreign_intrinsics,
+    layout_of,
+    mappings,
     refuse_foreign,
 )
-from lightpen.formats.documents import Tree, parse_document
+from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text
 from lightpen.messages import Message, message, printable
@@ -90,10 +93,6 @@ _SIZE = (
     "camera_res",
 )
 _MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix", "intrinsics")
-_DISTORTION = (
-    *("distortion_coefficients", "dist_coeffs", "distortion_coeffs"),
-    *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
-)
 _COVARIANCE = ("intrinsics_covariance",)
 _DEVIATIONS = (
     *("std_deviations_intrinsics", "standard_deviations_intrinsics"),
@@ -117,8 +116,7 @@ _MONTHS = [
 ]
 _ISO_DATE = r"(?a)(\d{4})[-/](\d\d)[-/](\d\d)(?!\d)"
 _C_DATE = rf"(?a)\w{{3}} ({'|'.join(_MONTHS)}) +(\d\d?) \d\d:\d\d:\d\d (\d{{4}})"
-_CAMERA_OF_CHAIN = r"(?a)cam\d+"
-_CAMERA_OF_ARRAY = r"(?a)cam\w*|\d+"
+_OTHERS = ("xi", "MappingCoefficients", "RadialDistortion", "PrincipalPoint")
 
 
 def read_camera(path: Path) -> Camera:
@@ -133,21 +131,43 @@ def read_camera(path: Path) -> Camera:
     refuse_foreign(read_bytes(path, CAMERA_FILE, CAMERA_FILE_LIMIT), name)
     text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
     tree = colmap_tree(text, name)
-    entries = Entries.of(parse_document(text, name) if tree is None else tree, name)
-    return _of_images(_sensor_camera(entries), entries)
+    whole = Entries.of(parse_document(text, name) if tree is None else tree, name)
+    found = list(_cameras_in(whole))
+    if len(found) > 1:
+        raise FileError("camera-file.several-cameras", name=name, n_cameras=len(found))
+    if not found:
+        keys = [printable(key) for key, _ in whole.values.values()][:6]
+        raise FileError("camera-file.unknown", name=name, found=", ".join(keys))
+    return _of_images(_sensor_camera(found[0]), found[0])
+
+
+def _cameras_in(entries: Entries) -> Iterator[Entries]:
+    """Yield the cameras of a document: itself, or what it has below its names.
+
+    A camera has also what stands beside its name, such as the size of all images.
+    """
+    if layout_of(entries) or entries.has(*_OTHERS) or _has_matrix(entries):
+        yield entries
+        return
+    parts = {key: mappings(value) for key, (_, value) in entries.values.items()}
+    own = {key: entries.values[key] for key, part in parts.items() if not part}
+    for part in parts.values():
+        for each in part:
+            below = Entries.of(each, entries.name).values
+            yield from _cameras_in(Entries(entries.name, own | below))
+
+
+def _has_matrix(entries: Entries) -> bool:
+    """Return whether an entry is a camera matrix, or numbers in its place."""
+    values = [entries.value(name) for name in _MATRIX if entries.has(name)]
+    return any(
+        "data" in value if isinstance(value, dict) else not mappings(value)
+        for value in values
+    )
 
 
 def _sensor_camera(entries: Entries) -> Camera:
-    """Return the camera of a file, of the size that its intrinsics are for."""
-    chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]
-    if chain and not any(_is_of_array(entries.value(key)) for key in chain):
-        camera = _only_camera(entries, chain)
-        return (_from_opencv if camera.has("K") else _from_kalibr)(camera)
-    listed = entries.part("cameras") if _has_mapping(entries, "cameras") else entries
-    array = [key for key in listed.values if re.fullmatch(_CAMERA_OF_ARRAY, key)]
-    array = [key for key in array if _is_of_array(listed.value(key))]
-    if array:
-        return _from_opencv(_only_camera(listed, array))
+    """Return the camera of the size that its intrinsics are for."""
     given = foreign_intrinsics(entries)
     if given is not None:
         return _camera(entries, *given)
@@ -158,31 +178,21 @@ def _sensor_camera(entries: Entries) -> Camera:
             program=message("camera-file.omnidirectional"),
             remedy=message("camera-file.by-images"),
         )
-    if entries.has("intrinsics") and entries.has("camera_model"):
-        return _from_kalibr(entries)
-    holder = "Intrinsics" if len(entries.values) > 1 else next(iter(entries.values), "")
-    if _has_mapping(entries, holder):
-        return _sensor_camera(entries.part(holder))
     if entries.has("MappingCoefficients"):
         raise _fisheye(entries.name, "fisheyeIntrinsics")
     if entries.has("RadialDistortion") or entries.has("PrincipalPoint"):
         return _from_matlab(entries)
+    if entries.has("intrinsics") and (
+        entries.has("camera_model") or len(entries.numbers("intrinsics")) == 4
+    ):
+        return _from_kalibr(entries)
     return _from_opencv(entries)
-
-
-def _has_mapping(entries: Entries, name: str) -> bool:
-    return entries.has(name) and isinstance(entries.value(name), dict)
-
-
-def _is_of_array(value: Tree) -> bool:
-    """Return whether a part of a file is a camera of caliscope or anipose."""
-    return isinstance(value, dict) and "size" in value
 
 
 def _of_images(camera: Camera, entries: Entries) -> Camera:
     """Return a camera of ROS for the images that its driver cuts and bins."""
     whole = camera.image_size
-    if _has_mapping(entries, "roi"):
+    if entries.has("roi") and isinstance(entries.value("roi"), dict):
         roi = entries.part("roi")
         names = ("x_offset", "y_offset", "width", "height")
         x, y, width, height = (_whole(roi, name) for name in names)
@@ -208,28 +218,11 @@ def _whole(entries: Entries, name: str) -> int:
     return int(number)
 
 
-def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
-    if len(chain) > 1:
-        raise FileError(
-            "camera-file.several-cameras", name=entries.name, n_cameras=len(chain)
-        )
-    return entries.part(chain[0])
-
-
 def _from_opencv(entries: Entries) -> Camera:
-    if not entries.has(*_MATRIX):
-        found = [printable(key) for key, _ in entries.values.values()][:6]
-        raise FileError(
-            "camera-file.unknown", name=entries.name, found=", ".join(found)
-        )
     lens = _lens(entries)
     matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
     return _camera(
-        entries,
-        _size(entries),
-        _pinhole(matrix, entries),
-        entries.numbers(*_DISTORTION),
-        lens,
+        entries, _size(entries), _pinhole(matrix, entries), _distortion(entries), lens
     )
 
 
@@ -241,8 +234,13 @@ def _from_kalibr(entries: Entries) -> Camera:
         )
     lens = _lens(entries)
     pinhole = entries.counted(4, "intrinsics")
-    coefficients = entries.numbers(*_DISTORTION)
-    return _camera(entries, _size(entries), pinhole, coefficients, lens)
+    return _camera(entries, _size(entries), pinhole, _distortion(entries), lens)
+
+
+def _distortion(entries: Entries) -> FloatArray:
+    if not entries.has(*DISTORTION):
+        raise FileError("camera-file.no-distortion", name=entries.name)
+    return entries.numbers(*DISTORTION)
 
 
 def _from_matlab(entries: Entries) -> Camera:

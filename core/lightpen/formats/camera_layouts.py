@@ -27,6 +27,11 @@ BROWN, KANNALA_BRANDT = LensModel.BROWN, LensModel.KANNALA_BRANDT
 _FOCAL = "f"
 _BASE = "ptr_wrapper/data/CameraModelCRT/CameraModelBase"  # of calib.io
 _RADIAL = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty"  # in the order of OpenCV
+DISTORTION = (
+    *("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coef"),
+    *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
+    "dist_coefs",
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,6 @@ class FileLayout:
     marks: str  # entries that tell the layout
     size: str  # paths of width and height, or of both together
     numbers: dict[str, str]  # by path: the names of the numbers there
-    part: str = ""  # path of the part that has all this
     lens: LensModel = BROWN  # where the file names no model
     model: str = ""  # path of the name of the lens model
     # Names of lens models without blanks and marks; of the last, if undistorted
@@ -100,8 +104,7 @@ LAYOUTS = (
     ),
     FileLayout(
         "calib.io",
-        marks="Calibration",
-        part="Calibration/cameras/model",
+        marks="polymorphic_name ptr_wrapper",
         size=f"{_BASE}/imageSize|{_BASE}/imageWidth {_BASE}/imageHeight",
         numbers=_each(
             f"f ar:aspect cx cy skew {_RADIAL} tauX:tx tauY:ty",
@@ -152,8 +155,7 @@ LAYOUTS = (
     ),
     FileLayout(
         "SVO",
-        marks="cameras",
-        part="cameras/camera",
+        marks="intrinsics distortion/parameters",
         size="image_width image_height",
         numbers={"intrinsics": "fx fy cx cy", "distortion/parameters": "k1 k2 p1 p2"},
         model="distortion/type",
@@ -163,8 +165,7 @@ LAYOUTS = (
     ),
     FileLayout(
         "Basalt",
-        marks="value0",
-        part="value0",
+        marks="resolution intrinsics/camera_type",
         size="resolution",
         numbers=_each(f"fx fy cx cy {_RADIAL}", "intrinsics/intrinsics/{}"),
         model="intrinsics/camera_type",
@@ -179,14 +180,6 @@ LAYOUTS = (
         model="camera_model",
         brown="opencv pinhole simplepinhole",
         fisheye="opencvfisheye",
-        first=0.5,
-    ),
-    FileLayout(
-        "Nerfstudio (by image)",
-        marks="frames",
-        part="frames",
-        size="w h",
-        numbers=_each("fl_x:fx fl_y:fy cx cy k1 k2 p1 p2 k3 k4"),
         first=0.5,
     ),
     FileLayout(
@@ -225,10 +218,11 @@ LAYOUTS = (
     FileLayout(
         "names alone",
         marks="fx fy cx cy",
-        size="width|image_width height|image_height",
+        size="width|image_width|cols height|image_height|rows",
         numbers=_each(f"fx fy cx cy skew {_RADIAL}"),
         model="distortion_model|camera_model|model",
-        brown="plumbbob radtan brown brownconrady opencv pinhole rationalpolynomial",
+        brown="plumbbob radtan brown brownconrady opencv pinhole rationalpolynomial "
+        "perspective",
         fisheye="equidistant fisheye kannalabrandt opencvfisheye",
     ),
 )
@@ -280,7 +274,7 @@ FOREIGN = (
     (r"\"pxFocalLength\"|\"distortionParams\"", "Meshroom", _AS_TEXT),
     (r"\"CalibrationInformation\"", "Azure Kinect", _AS_TEXT),
     (r"aslam_cv|reprojection error: \[", "Kalibr (results as text)", _AS_TEXT),
-    (r"camera(Parameters|Intrinsics) with properties", "MATLAB (display)", _AS_TEXT),
+    (r"camera(Parameters|Intrinsics)( with|\()", "MATLAB (code, display)", _AS_TEXT),
     (r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", "ZED", _AS_TEXT),
     (r"\"projection_type\"\s*:", "OpenSfM", _AS_TEXT),
     (r"\"cameraData\"\s*:", "DepthAI (OAK-D)", _AS_TEXT),
@@ -291,7 +285,17 @@ FOREIGN = (
     (r"\barray\(\[", "Python (display)", _AS_TEXT),
     (r"\A[\1-\x1f]\0{7}.\0{3}[\0-\x1f]\0{3}", "COLMAP (cameras.bin)", _AS_TEXT),
     (r"(?m)^model_type:\W*(?i:scaramuzza)", "camodocal (Scaramuzza)", _BY_IMAGES),
-    (r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|mtx_l)\b", "a stereo pair", _OF_PAIR),
+    (
+        r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|CameraParameters2|mtx_l)\b",
+        "a stereo pair",
+        _OF_PAIR,
+    ),
+    (r"(?m)^\W*K_\d+\W", "KITTI or EasyMocap", _OF_PAIR),
+    (r"(?m)\"camera_params\"|^camera_params *=", "COLMAP (settings)", _AS_TEXT),
+    (r"ensDistortionLookupTable", "Apple (AVFoundation)", _BY_IMAGES),
+    (r"\"intrinsic_type\"", "OpenCameraCalibrator", _BY_IMAGES),
+    (r"<OpticalProperties", "ContextCapture", _AS_TEXT),
+    (r"(?im)^Focal length:\s*(fc = *)?\[", "GML, Bouguet (display)", _AS_TEXT),
     (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
 )
 
@@ -335,25 +339,39 @@ def foreign_intrinsics(entries: Entries) -> Given | None:
 
     Raises `FileError` for a lens model that is not read, or if a number is missing.
     """
-    if entries.has("calibrations"):  # of PhotonVision, one a resolution
-        entries = _descend(entries, "calibrations")
+    layout = layout_of(entries)
+    return None if layout is None else _given(layout, entries)
+
+
+def layout_of(entries: Entries) -> FileLayout | None:
+    """Return the layout whose marks a mapping has."""
     for layout in LAYOUTS:
-        is_marked = all(entries.has(*mark.split("|")) for mark in layout.marks.split())
-        if is_marked and (not layout.part or _holder(entries, layout.part)[0]):
-            return _given(layout, entries)
+        if all(_holder(entries, mark)[0] for mark in layout.marks.split()):
+            return layout
     return None
 
 
 def _given(layout: FileLayout, entries: Entries) -> Given:
-    part = _descend(entries, layout.part)
-    lens, stated = _lens(layout, part)
-    size = np.concatenate([_numbers(part, path) for path in layout.size.split()])
+    lens, stated = _lens(layout, entries)
+    size = np.concatenate([_numbers(entries, path) for path in layout.size.split()])
     if len(size) != 2:
         raise FileError("camera-file.no-size", name=entries.name)
-    named: dict[str, float] = {}
     others = layout.of_fisheye if lens is KANNALA_BRANDT else {}
-    for path, names in (layout.numbers | others).items():
-        values = _numbers(part, path)
+    named = _named(layout.numbers | others, entries)
+    pinhole = _pinhole(named, size, layout, entries)
+    if entries.has(*DISTORTION) and not any(name in named for name in _RADIAL.split()):
+        named |= _usual_distortion(entries, lens)
+    if lens is None and any(named.get(name) for name in _RADIAL.split()):
+        raise _unread(layout, stated, entries)
+    lens = lens or BROWN
+    return Given((size[0], size[1]), pinhole, _coefficients(named, lens), lens)
+
+
+def _named(numbers: dict[str, str], entries: Entries) -> dict[str, float]:
+    """Return the numbers at paths by their names here."""
+    named: dict[str, float] = {}
+    for path, names in numbers.items():
+        values = _numbers(entries, path)
         if len(values) > len(names.split()):
             raise FileError(
                 "entry.wrong-count",
@@ -363,11 +381,18 @@ def _given(layout: FileLayout, entries: Entries) -> Given:
                 needed=len(names.split()),
             )
         named |= dict(zip(names.split(), values.tolist(), strict=False))
-    pinhole = _pinhole(named, size, layout, entries)
-    if lens is None and any(named.get(name) for name in _RADIAL.split()):
-        raise _unread(layout, stated, entries)
-    lens = lens or BROWN
-    return Given((size[0], size[1]), pinhole, _coefficients(named, lens), lens)
+    return named
+
+
+def _usual_distortion(entries: Entries, lens: LensModel | None) -> dict[str, float]:
+    """Return the distortion under a usual name that the layout does not have."""
+    names = "k1 k2 k3 k4" if lens is KANNALA_BRANDT else _RADIAL
+    key, value = entries.entry(*DISTORTION)
+    is_mapping = isinstance(value, dict) and "data" not in value
+    found = _named(_each(names, key + "/{}") if is_mapping else {key: names}, entries)
+    if is_mapping and not found:
+        raise FileError("camera-file.no-distortion", name=entries.name)
+    return found
 
 
 def _pinhole(
@@ -445,28 +470,25 @@ def _holder(entries: Entries, path: str) -> tuple[Entries | None, str]:
         *above, key = spelling.split("/")
         holder: Entries | None = entries
         for each in above:
-            if holder is None or not holder.has(each):
-                holder = None
-                break
-            holder = _descend(holder, each)
+            holder = _below(holder, each)
         if holder is not None and holder.has(key):
             return holder, key
     return None, path
 
 
-def _descend(entries: Entries, path: str) -> Entries:
-    """Return the mapping at a path; a list on the way must be of one camera."""
-    for key in filter(None, path.split("/")):
-        value = entries.value(key)
-        if isinstance(value, list):
-            if len(value) != 1:
-                raise FileError(
-                    "camera-file.several-cameras",
-                    name=entries.name,
-                    n_cameras=len(value),
-                )
-            value = value[0]
-        if not isinstance(value, dict):
-            raise FileError("entry.nothing-below", entry=key, name=entries.name)
-        entries = Entries.of(value, entries.name)
-    return entries
+def _below(entries: Entries | None, key: str) -> Entries | None:
+    """Return the mapping of an entry, None without one; a list must be of one."""
+    found = mappings(entries.value(key)) if entries and entries.has(key) else []
+    if entries is None or not found:
+        return None
+    if len(found) > 1:
+        raise FileError(
+            "camera-file.several-cameras", name=entries.name, n_cameras=len(found)
+        )
+    return Entries.of(found[0], entries.name)
+
+
+def mappings(value: Tree) -> list[dict[str, Tree]]:
+    """Return the mapping that a value is, or those that it lists."""
+    listed = value if isinstance(value, list) else [value]
+    return [each for each in listed if isinstance(each, dict)]

@@ -56,6 +56,8 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
         tree = parse_json(text, name)
     else:
         tree = parse_yaml(text, name)
+    if isinstance(tree, list) and any(isinstance(each, dict) for each in tree):
+        tree = {"list": tree}
     if not isinstance(tree, dict):
         raise FileError("document.no-values", name=name, start=quoted(text.strip()))
     return tree

@@ -127,7 +127,7 @@ _OF_PLAN = r"(nominal|nom|sollwert|soll)"
 _COLUMN = (
     rf"(?:{_ACTUAL}[\s_]+|{_OF_PLAN}[\s_]+)?"
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
-    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value))?"
+    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value|wert))?"
     rf"(?:[\s_]*{_ACTUAL}|[\s_]*{_OF_PLAN})?"
     r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
@@ -152,18 +152,21 @@ def from_table(table: Table, units: str | None) -> PenContent:
     if len(stated) > 1:
         one, other = sorted(stated)[:2]
         raise FileError("pen-file.mixed-units", name=table.name, one=one, other=other)
-    unit = agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
     with_normals = "nx" in bare.header or _has_normals(bare)
     if not bare.header and bare.n_columns == 7 and not with_normals:
         bare = replace(bare, rows=[row[:4] for row in bare.rows])
     names: tuple[str, ...] = _LED_NAMES
-    if not any(name in names for name in bare.header) and bare.header[:1] != ("x",):
+    is_named = any(name in names for name in bare.header)
+    if not is_named and bare.header[:1] != ("x",):
         names += bare.header[:1]  # what a measuring program calls its elements
-    wanted = [names, *_COORDINATES, *(_NORMALS if with_normals else ())]
-    columns = bare.columns(wanted, message("table.of-leds"))
-    table = _in_number_order(table, columns[0])
-    numbers = table.numbers(columns[1:])
+        is_named = True
+    wanted = [*_COORDINATES, *(_NORMALS if with_normals else ())]
+    columns = bare.columns([names, *wanted][not is_named :], message("table.of-leds"))
+    unit = agreed_unit(stated.pop() if stated else "", units, table.name)
+    if is_named:
+        table = _in_number_order(table, columns.pop(0))
+    numbers = table.numbers(columns)
     diameter = None
     if "diameter" in bare.header:
         place = bare.header.index("diameter")
@@ -300,7 +303,7 @@ _ROM = b"NDI\x00"
 _FOREIGN = (  # how files begin that cannot be read
     (rb"\s*<", "XML (Motive, Vicon)"),
     (rb"\s*Format Version,", "Motive (CSV)"),
-    (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
+    (rb"(\s*\[\w+\]\s*\n)+\s*\w+\s*=", "INI (Atracsys)"),
     (rb"# Markups fiducial|\s*{\s*\"@schema\"", "3D Slicer (markups)"),
 )
 

@@ -15,7 +15,7 @@ of a tip that rests at one place.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +70,7 @@ class _Role:
 
 def tools_of(table: Table) -> list[ToolColumns]:
     """Return the tools that the header of a table names."""
-    roles = [_role(name) for name in table.header]
+    roles = _roles(table.header)
     for name, role in zip(table.header, roles, strict=True):
         stated = re.search(_UNIT, name)
         if role is not None and role.kind == "t" and stated and stated[2]:
@@ -104,7 +104,16 @@ def is_lost(state: str, column: str = "") -> bool:
     return bool(re.fullmatch(_LOST, state) or (is_flag and state in ("0", "0.0")))
 
 
-def _role(name: str) -> _Role | None:
+def _roles(header: Sequence[str]) -> list[_Role | None]:
+    """Return the roles of columns; beside ``pen_qx``, ``pen_x`` is a place."""
+    roles = [_role(name) for name in header]
+    tools = {role.tool for role in roles if role is not None and role.kind != "t"}
+    return [
+        role or _role(name, tools) for name, role in zip(header, roles, strict=True)
+    ]
+
+
+def _role(name: str, tools: Container[str] = ()) -> _Role | None:
     stated = re.search(_UNIT, name)
     base = re.sub(_UNIT, "", name).strip()
     unit = UNITS[UNIT_NAMES[stated[1]]] if stated and stated[1] else None
@@ -115,7 +124,7 @@ def _role(name: str) -> _Role | None:
         return _Role("v", axis, unit, tool)
     if words & _ROTATING and axis in {*"wxyz", *_SCALARS}:
         return _Role("q", _SCALARS.get(axis, axis), unit, tool)
-    if axis in {*"xyz"} and (words & _MOVING or not words):
+    if axis in {*"xyz"} and (words & _MOVING or not words or stem in tools):
         return _Role("t", axis, unit, tool)
     return _Role("q", "w", unit, tool) if base == "w" else None
 
@@ -186,7 +195,7 @@ def _matrix(header: Sequence[str]) -> ToolColumns | None:
     moved = [found.get((i, last)) for i in rows]
     unit = None
     if None in moved:
-        roles = [_role(name) for name in header]
+        roles = _roles(header)
         places = {r.axis: i for i, r in enumerate(roles) if r and r.kind == "t"}
         moved = [places.get(axis) for axis in "xyz"]
         units = [r.unit for r in roles if r and r.kind == "t"]

@@ -5176,12 +5176,12 @@
         <translation>{name} 第 {line} 行有 {n_cells} 个单元格，而第 {first_line} 行有 {expected} 个。{hint}</translation>
     </message>
     <message>
-        <source>Line {line} of {name} is not valid JSON ({problem}, column {column}). The file may be cut short: copy or export it again.</source>
-        <translation>{name} 第 {line} 行不是有效的 JSON（{problem}，第 {column} 列）。文件可能不完整：请重新复制或导出。</translation>
-    </message>
-    <message>
         <source>Line {line} of {name} is not valid XML ({problem}). The file may be cut short: copy or export it again.</source>
         <translation>{name} 第 {line} 行不是有效的 XML（{problem}）。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid YAML ({problem}). Check that this is the right file, whole and in a form that the documents list under input files.</source>
+        <translation>{name} 第 {line} 行不是有效的 YAML（{problem}）。请确认文件正确、完整，且格式为文档“输入文件”中所列的一种。</translation>
     </message>
     <message>
         <source>Line {line} of {name}: the quotation marks do not pair up. Remove or complete them.</source>
@@ -6056,6 +6056,10 @@
         <translation>{name} 不以 .yaml 结尾；内参文件以 YAML 保存。请选择以 .yaml 结尾的名称。</translation>
     </message>
     <message>
+        <source>{name} does not state the distortion. Add the line distortion_coefficients: [k1, k2, p1, p2, k3], with zeros if the images are free of distortion.</source>
+        <translation>{name} 未给出畸变。请加入一行 distortion_coefficients: [k1, k2, p1, p2, k3]；若图像无畸变则填零。</translation>
+    </message>
+    <message>
         <source>{name} does not state the image size. Add the lines image_width and image_height, in pixels.</source>
         <translation>{name} 没有说明图像尺寸。请加上 image_width 和 image_height 两行，单位为像素。</translation>
     </message>
@@ -6074,10 +6078,6 @@
     <message>
         <source>{name} has more than {most} lines. Check that this is the right file, or split it.</source>
         <translation>{name} 超过 {most} 行。请检查文件是否正确，或将其拆分。</translation>
-    </message>
-    <message>
-        <source>{name} has no column {column}; {what} need the columns {wanted}. Its header is {header}. Rename the columns.</source>
-        <translation>{name} 没有列 {column}；{what} 需要列 {wanted}。其表头为 {header}。请重命名列。</translation>
     </message>
     <message>
         <source>{name} has no columns of poses that are known. Its header is {header}. Name the columns qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.</source>
@@ -6190,10 +6190,6 @@
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that this is the right file.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
-    </message>
-    <message>
-        <source>{name} is not valid TOML ({problem}). The file may be cut short: copy or export it again.</source>
-        <translation>{name} 不是有效的 TOML（{problem}）。文件可能被截断：请重新复制或导出。</translation>
     </message>
     <message>
         <source>{name} is the raw image of a colour camera: its pixels repeat the pattern of a Bayer filter, which moves the centres of LEDs. Save the images in colour (demosaiced) or grey, or use a monochrome camera.</source>
@@ -6670,6 +6666,10 @@
     <message>
         <source>{name} has its principal point at ({cx:g}, {cy:g}) px, far outside the image of {width} x {height} px. Check that both belong to the same camera and image size.</source>
         <translation>{name} 的主点位于 ({cx:g}, {cy:g}) px，远在 {width} × {height} px 的图像之外。请检查两者是否属于同一台相机和同一图像尺寸。</translation>
+    </message>
+    <message>
+        <source>{name} has no column {column}; {what} need the columns {wanted}, with a line for each. Its header is {header}. Rename the columns, or arrange the table so.</source>
+        <translation>{name} 没有列 {column}；{what}需要列 {wanted}，每项一行。其表头为 {header}。请重命名各列，或按此整理表格。</translation>
     </message>
     <message>
         <source>{name} has no header and {n_columns} columns. Poses have 7 (quaternion and translation), 12 or 16 (matrix), with a number or time before them. Put a header line on top: qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.</source>
@@ -7324,10 +7324,6 @@
         <translation>在锥孔中向各方向倾斜光笔</translation>
     </message>
     <message>
-        <source>Line {line} of {name} is not valid YAML ({problem}). The file may be of another kind, or cut short: check that this is the right file, or export it again.</source>
-        <translation>{name} 的第 {line} 行不是有效的 YAML（{problem}）。文件可能属于其他类型或不完整：请检查文件是否正确，或重新导出。</translation>
-    </message>
-    <message>
         <source>Move {axis}</source>
         <translation>位移 {axis}</translation>
     </message>
@@ -7742,6 +7738,10 @@
     <message>
         <source>LEDs {leds} are out of order. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
         <translation>LED {leds} 的顺序有误。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 须沿两列同向排列。请按此编号。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid JSON ({problem}, column {column}). Check that this is the right file, whole and in a form that the documents list under input files.</source>
+        <translation>{name} 第 {line} 行不是有效的 JSON（{problem}，第 {column} 列）。请确认文件正确、完整，且格式为文档“输入文件”中所列的一种。</translation>
     </message>
     <message>
         <source>The LED layout does not define the pen frame, which needs ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. Measure the LEDs again, or give the coordinates of another layout in its own frame.</source>
@@ -8270,6 +8270,10 @@
     <message>
         <source>{name} is no workbook with a sheet that can be read. Save the sheet with the table as CSV.</source>
         <translation>{name} 不是含可读工作表的工作簿。请将含表格的工作表另存为 CSV。</translation>
+    </message>
+    <message>
+        <source>{name} is not valid TOML ({problem}). Check that this is the right file, whole and in a form that the documents list under input files.</source>
+        <translation>{name} 不是有效的 TOML（{problem}）。请确认文件正确、完整，且格式为文档“输入文件”中所列的一种。</translation>
     </message>
     <message>
         <source>{name} is not valid YAML. Check that this is the right file.</source>

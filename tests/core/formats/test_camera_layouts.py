@@ -139,7 +139,7 @@ projection_parameters:
 """
 
 
-def read(folder: Path, text: str | dict[str, Any]) -> Camera:
+def read(folder: Path, text: str | dict[str, Any] | list[Any]) -> Camera:
     path = folder / "camera.file"
     path.write_text(text if isinstance(text, str) else json.dumps(text), "utf-8")
     return read_camera(path)
@@ -275,6 +275,31 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(PLAIN, id="names alone"),
         pytest.param({"camera": PLAIN}, id="within a name"),
         pytest.param({"calibration": PLAIN}, id="within a name of calib.io"),
+        pytest.param(
+            ANIPOSE.replace("[cam_0]", "[int_cam01_img]"), id="anipose of Pose2Sim"
+        ),
+        pytest.param([{"camera": PLAIN}], id="within a list"),
+        pytest.param(
+            {"cameras": [{"resolution": SIZE, "K": MATRIX, "distCoef": BROWN}]},
+            id="a list of cameras with one",
+        ),
+        pytest.param(
+            {"image_size": SIZE, "a": {"K": MATRIX, "dist": BROWN}, "rms": 0.2},
+            id="the size beside the camera",
+        ),
+        pytest.param(
+            {"Camera": {"model": "perspective", "cols": 1280, "rows": 720} | NUMBERS},
+            id="stella_vslam",
+        ),
+        pytest.param(
+            dict(zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True))
+            | {"width": 1280, "height": 720, "dist": BROWN},
+            id="names and a list of coefficients",
+        ),
+        pytest.param(
+            {"stream": without(REALSENSE, "coeffs") | {"distortion": NUMBERS}},
+            id="RealSense with coefficients by names",
+        ),
         pytest.param(
             {"cameras": {"cam0": {"K": MATRIX, "dist": BROWN, "image_size": SIZE}}},
             id="within names of SVO and Kalibr",
@@ -444,6 +469,18 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         (METASHAPE.replace("<k2>", "<k4>0.2</k4><k2>"), "thin prism or a tilted"),
         (METASHAPE.replace("<b1>2.25</b1>", "<b2>0.3</b2>"), "skew of 0.3 px"),
         (json.dumps(calib_io(tauX=0.1)), "thin prism or a tilted sensor"),
+        ("p = cameraParameters('K', [1 0 0], 'ImageSize', [9 9]);", "MATLAB"),
+        ({"CameraParameters1": {}, "CameraParameters2": {}}, "a stereo pair"),
+        ("calib_time: 09-Jan-2012\nK_00: 984 0 690 0 980 233 0 0 1\n", "KITTI"),
+        ("%YAML:1.0\nnames:\n  - '1'\nK_1: !!opencv-matrix\n", "EasyMocap"),
+        ("[ImageReader]\ncamera_model=OPENCV\ncamera_params=1,1,0\n", "COLMAP"),
+        ({"list": [{"cameras": [{"camera_params": [1, 2, 3]}]}]}, "COLMAP"),
+        ({"lensDistortionLookupTable": [0, 0.1], "pixelSize": 0.001}, "Apple"),
+        ({"intrinsic_type": "DIVISION_UNDISTORTION"}, "OpenCameraCalibrator"),
+        ("<OpticalProperties version='1.0'><Id>0</Id></OpticalProperties>", "Context"),
+        ("Project: a\nFocal length: [ 4640.0 4635.5 ] +/- [ 1 1 ]\n", "GML"),
+        ({"w": 1280, "h": 720, "K": MATRIX}, "does not state the distortion"),
+        ({**REALSENSE, "coeffs": [], "dist": {"a": 1}}, "not state the distortion"),
     ],
 )
 def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> None:
@@ -474,8 +511,9 @@ def test_a_binary_file_is_named(tmp_path: Path, data: bytes, named: str) -> None
         CALISCOPE + CALISCOPE.replace("cam_0", "cam_1"),
         COLMAP + "2 PINHOLE 1280 720 1320.5 1318.25 652.75 356.25\n",
         {"Calibration": {"cameras": calib_io()["Calibration"]["cameras"] * 2}},
+        {"size": SIZE, "left": {"K": MATRIX, "D": BROWN}, "right": {"K": MATRIX}},
     ],
-    ids=["caliscope", "COLMAP", "calib.io"],
+    ids=["caliscope", "COLMAP", "calib.io", "by names"],
 )
 def test_several_cameras_are_counted(
     tmp_path: Path, text: str | dict[str, Any]

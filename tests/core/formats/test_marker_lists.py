@@ -153,6 +153,7 @@ def cmm(columns: str, values: str, units: str = "") -> str:
             "",
         ),
         ("X-Koordinate;Y-Koordinate;Z-Koordinate", "{x};{y};{z}", ";mm;mm;mm"),
+        ("X-Wert;Y-Wert;Z-Wert", "{x};{y};{z}", ";mm;mm;mm"),
     ],
 )
 def test_the_actual_coordinates_of_a_report_are_taken(
@@ -299,6 +300,7 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
         ("<?xml version='1.0'?>\n<RigidBodies><Marker X='1'/></RigidBodies>", "XML"),
         ("Format Version,1.23,Length Units,Millimeters\n\n,,Marker\n", "Motive"),
         ("[geometry]\ncount=4\nid=5\n[fiducial0]\nx=1\n", "Atracsys"),
+        ("[geometry]\n[fiducial0]\nx=1\ny=2\nz=3\n", "Atracsys"),
         ("ply\nformat ascii 1.0\nelement vertex 4\n", "PLY"),
         ("solid pen\n facet normal 0 0 1\n", "STL"),
         ("# Markups fiducial file version = 4.11\n1,2,3,4\n", "3D Slicer"),
@@ -338,3 +340,19 @@ def test_the_first_column_names_the_points_whatever_its_title(tmp_path: Path) ->
     path.write_text("Merkmal;x_mm;y_mm;z_mm\n" + "".join(rows))
 
     np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+
+
+def test_coordinates_alone_are_leds_in_their_order(tmp_path: Path) -> None:
+    rows = [f"{x},{y},{z}\n" for x, y, z in LEDS]
+    path = saved(tmp_path, "x,y,z\nmm,mm,mm\n" + "".join(rows))
+
+    np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+
+
+def test_a_report_with_a_line_for_each_coordinate_is_told_the_columns(
+    tmp_path: Path,
+) -> None:
+    rows = [f"LED{i},{axis},1\n" for i in (1, 2) for axis in "XYZ"]
+    text = "Element,Feature,Actual\n" + "".join(rows)
+
+    assert "led,x,y,z, with a line for each" in refusal(tmp_path, text)

@@ -69,9 +69,17 @@ def vectors() -> list[str]:
     return [header, *rows(np.arange(N_POSES), ROTATIONS.as_rotvec(), MOVED)]
 
 
+def named_by_tool() -> list[str]:
+    header = "frame\tpen_X\tpen_Y\tpen_Z\tpen_Qx\tpen_Qy\tpen_Qz\tpen_Qw"
+    return [header, *rows(np.arange(N_POSES), MOVED, QUATERNIONS)]
+
+
 @pytest.mark.parametrize(
     "lines",
-    [scalar_last, scalar_first, tum, matrices, vectors, lambda: ndi(["OK"] * N_POSES)],
+    [
+        *(scalar_last, scalar_first, tum, matrices, vectors, named_by_tool),
+        lambda: ndi(["OK"] * N_POSES),
+    ],
 )
 def test_poses_of_other_programs_are_read_in_their_conventions(
     tmp_path: Path, lines: Callable[[], list[str]]
