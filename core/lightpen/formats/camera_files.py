@@ -69,8 +69,9 @@ from lightpen.formats.camera_layouts import (
     layout_of,
     mappings,
     refuse_foreign,
+    size_of,
 )
-from lightpen.formats.documents import parse_document
+from lightpen.formats.documents import Tree, parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text
 from lightpen.messages import Message, message, printable
@@ -86,12 +87,6 @@ LARGEST_AMPLITUDE = 10.0  # px, of a lens field; more is another distortion
 SHORTEST_LENGTH = 10.0  # px
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
-_WIDTH = ("image_width", "width", "w")
-_HEIGHT = ("image_height", "height", "h")
-_SIZE = (
-    *("image_size", "resolution", "image_resolution", "img_size", "size"),
-    "camera_res",
-)
 _MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix", "intrinsics")
 _COVARIANCE = ("intrinsics_covariance",)
 _DEVIATIONS = (
@@ -116,6 +111,7 @@ _MONTHS = [
 ]
 _ISO_DATE = r"(?a)(\d{4})[-/](\d\d)[-/](\d\d)(?!\d)"
 _C_DATE = rf"(?a)\w{{3}} ({'|'.join(_MONTHS)}) +(\d\d?) \d\d:\d\d:\d\d (\d{{4}})"
+_BESIDE = r".*(size|resolution|dist\w*)"  # a camera, of which they are a part
 _OTHERS = ("xi", "MappingCoefficients", "RadialDistortion", "PrincipalPoint")
 
 
@@ -149,12 +145,15 @@ def _cameras_in(entries: Entries) -> Iterator[Entries]:
     if layout_of(entries) or entries.has(*_OTHERS) or _has_matrix(entries):
         yield entries
         return
-    parts = {key: mappings(value) for key, (_, value) in entries.values.items()}
-    own = {key: entries.values[key] for key, part in parts.items() if not part}
-    for part in parts.values():
-        for each in part:
-            below = Entries.of(each, entries.name).values
-            yield from _cameras_in(Entries(entries.name, own | below))
+    own: dict[str, tuple[str, Tree]] = {}
+    parts: list[dict[str, Tree]] = []
+    for key, (name, value) in entries.values.items():
+        below = [] if re.fullmatch(_BESIDE, key) else mappings(value)
+        parts += below
+        own |= {} if below else {key: (name, value)}
+    for part in parts:
+        values = own | Entries.of(part, entries.name).values
+        yield from _cameras_in(Entries(entries.name, values))
 
 
 def _has_matrix(entries: Entries) -> bool:
@@ -222,7 +221,7 @@ def _from_opencv(entries: Entries) -> Camera:
     lens = _lens(entries)
     matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
     return _camera(
-        entries, _size(entries), _pinhole(matrix, entries), _distortion(entries), lens
+        entries, size_of(entries), _pinhole(matrix, entries), _distortion(entries), lens
     )
 
 
@@ -234,7 +233,7 @@ def _from_kalibr(entries: Entries) -> Camera:
         )
     lens = _lens(entries)
     pinhole = entries.counted(4, "intrinsics")
-    return _camera(entries, _size(entries), pinhole, _distortion(entries), lens)
+    return _camera(entries, size_of(entries), pinhole, _distortion(entries), lens)
 
 
 def _distortion(entries: Entries) -> FloatArray:
@@ -285,18 +284,6 @@ def _lens(entries: Entries) -> LensModel:
 
 def _fisheye(name: str | Message, model: str) -> FileError:
     return FileError("camera-file.fisheye", name=name, model=model)
-
-
-def _size(entries: Entries) -> tuple[float, float]:
-    if entries.has(*_SIZE) and not entries.has(*_WIDTH):
-        stated = entries.value(*_SIZE)
-        if isinstance(stated, dict) and "width" in stated:
-            return _size(entries.part(*_SIZE))
-        width, height = entries.counted(2, *_SIZE)
-        return width, height
-    if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):
-        raise FileError("camera-file.no-size", name=entries.name)
-    return entries.counted(1, *_WIDTH)[0], entries.counted(1, *_HEIGHT)[0]
 
 
 def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:

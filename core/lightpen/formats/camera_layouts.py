@@ -8,7 +8,6 @@ a number that means nothing. What a file does not have is 0.
 """
 
 import re
-from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_checks import check_skew
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import kind_of, quoted
+from lightpen.formats.files import foreign_program, quoted
 from lightpen.messages import message
 from lightpen.model.camera import LensModel
 
@@ -27,6 +26,12 @@ BROWN, KANNALA_BRANDT = LensModel.BROWN, LensModel.KANNALA_BRANDT
 _FOCAL = "f"
 _BASE = "ptr_wrapper/data/CameraModelCRT/CameraModelBase"  # of calib.io
 _RADIAL = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty"  # in the order of OpenCV
+_WIDTH = ("image_width", "width", "w", "cols")
+_HEIGHT = ("image_height", "height", "h", "rows")
+_SIZE = (
+    *("image_size", "resolution", "image_resolution", "img_size", "size"),
+    *("camera_res", "camera_resolution", "image_dimension", "image_dimensions"),
+)
 DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coef"),
     *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
@@ -43,8 +48,8 @@ class FileLayout:
 
     program: str
     marks: str  # entries that tell the layout
-    size: str  # paths of width and height, or of both together
     numbers: dict[str, str]  # by path: the names of the numbers there
+    size: str = ""  # paths of width and height, or of both, unless of usual names
     lens: LensModel = BROWN  # where the file names no model
     model: str = ""  # path of the name of the lens model
     # Names of lens models without blanks and marks; of the last, if undistorted
@@ -83,7 +88,6 @@ LAYOUTS = (
     FileLayout(
         "COLMAP",
         marks="colmap",
-        size="width height",
         numbers=_each(f"f fx fy cx cy {_RADIAL}"),
         model="colmap",
         brown="simplepinhole pinhole simpleradial radial opencv fullopencv",
@@ -92,8 +96,7 @@ LAYOUTS = (
     ),
     FileLayout(
         "Metashape",
-        marks="projection",
-        size="width height",
+        marks="projection f",
         numbers=_each(
             "f b1 b2:skew cx:dx cy:dy k1 k2 k3 k4:r8 p1:p2 p2:p1 p3:s1 p4:s2"
         ),
@@ -116,14 +119,12 @@ LAYOUTS = (
     FileLayout(
         "Zivid",
         marks="version CameraIntrinsics",
-        size="image_width image_height",
         numbers=_each("fx fy cx cy", "CameraIntrinsics/CameraMatrix/{}")
         | _each("k1 k2 p1 p2 k3", "CameraIntrinsics/Distortion/{}"),
     ),
     FileLayout(
         "PhotonVision",
         marks="cameraIntrinsics",
-        size="resolution",
         numbers={
             "cameraIntrinsics": "fx skew cx - fy cy - - -",
             "distCoeffs|cameraExtrinsics": _RADIAL,
@@ -132,7 +133,6 @@ LAYOUTS = (
     FileLayout(
         "RealSense",
         marks="ppx ppy",
-        size="width height",
         numbers=_each("fx fy ppx:cx ppy:cy") | {"coeffs": "k1 k2 p1 p2 k3"},
         model="model|distortion_model",
         brown="none brownconrady",
@@ -143,7 +143,6 @@ LAYOUTS = (
     FileLayout(
         "camodocal",
         marks="model_type projection_parameters",
-        size="image_width image_height",
         numbers=_each(
             "fx fy cx cy mu:fx mv:fy u0:cx v0:cy k2:k1 k3:k2 k4:k3 k5:k4",
             "projection_parameters/{}",
@@ -156,7 +155,6 @@ LAYOUTS = (
     FileLayout(
         "SVO",
         marks="intrinsics distortion/parameters",
-        size="image_width image_height",
         numbers={"intrinsics": "fx fy cx cy", "distortion/parameters": "k1 k2 p1 p2"},
         model="distortion/type",
         brown="radialtangential none",
@@ -164,9 +162,16 @@ LAYOUTS = (
         of_fisheye={"distortion/parameters": "k1 k2 k3 k4"},
     ),
     FileLayout(
+        "OKVIS",
+        marks="focal_length principal_point distortion_type",
+        numbers={"focal_length": "fx fy", "principal_point": "cx cy"},
+        model="distortion_type",
+        brown="radialtangential radialtangential8",
+        fisheye="equidistant",
+    ),
+    FileLayout(
         "Basalt",
         marks="resolution intrinsics/camera_type",
-        size="resolution",
         numbers=_each(f"fx fy cx cy {_RADIAL}", "intrinsics/intrinsics/{}"),
         model="intrinsics/camera_type",
         brown="pinhole pinholeradtan8",
@@ -175,7 +180,6 @@ LAYOUTS = (
     FileLayout(
         "Nerfstudio",
         marks="fl_x w",
-        size="w h",
         numbers=_each("fl_x:fx fl_y:fy cx cy k1 k2 p1 p2 k3 k4"),
         model="camera_model",
         brown="opencv pinhole simplepinhole",
@@ -195,7 +199,6 @@ LAYOUTS = (
     FileLayout(
         "Open3D",
         marks="intrinsic_matrix width height",
-        size="width height",
         numbers={"intrinsic_matrix": "fx - - skew fy - cx cy -"},  # column by column
     ),
     FileLayout(
@@ -218,7 +221,6 @@ LAYOUTS = (
     FileLayout(
         "names alone",
         marks="fx fy cx cy",
-        size="width|image_width|cols height|image_height|rows",
         numbers=_each(f"fx fy cx cy skew {_RADIAL}"),
         model="distortion_model|camera_model|model",
         brown="plumbbob radtan brown brownconrady opencv pinhole rationalpolynomial "
@@ -241,73 +243,19 @@ _COLMAP_LINE = (
     r"(?am)^[ \t]*\d+[ \t]+([A-Z][A-Z_0-9]+)((?:[ \t]+[-+.\deE]+){3,})[ \t]*$"
 )
 _BY_IMAGES = message("camera-file.by-images")
-_OF_PROJECT = message("camera-file.of-project")
-_AS_TEXT = message("camera-file.as-text")
-_OF_PAIR = message("camera-file.of-pair")
-_OTHER_FILE = message("camera-file.other-file")
-FOREIGN = (
-    (
-        r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):|\"(area|line)_scan_",
-        "Halcon",
-        _BY_IMAGES,
-    ),
-    (r"#\s*polynomial coefficients for the DIRECT", "OCamCalib", _BY_IMAGES),
-    (r"(?m)^\s*Model\s*=\s*CAHV", "CAHVOR", _BY_IMAGES),
-    (r"\APix4D camera calibration", "Pix4D", _BY_IMAGES),
-    (r"photoshop:CameraProfiles|<lensdatabase", "a lens profile", _BY_IMAGES),
-    (r"<x:xmpmeta", "RealityCapture (XMP)", _AS_TEXT),
-    (r"\AfileName imageWidth imageHeight", "Pix4D (all images)", _AS_TEXT),
-    (r"<ExportAPERO>", "MicMac", _BY_IMAGES),
-    (r"\ANVM_V\d", "VisualSFM", _BY_IMAGES),
-    (r"\A([A-Z]\w+ )?(-?[\d.]+\s+){5,11}(crop|full|none)\b", "DSO", _BY_IMAGES),
-    (r"(?m)^\[CAMERA_PARAMS", "MRPT", _AS_TEXT),
-    (r"(?m)^camera\.\d\.A=\[", "DLR CalLab", _AS_TEXT),
-    (r"(?m)^(P0: |cam0=\[)", "rectified images (KITTI, Middlebury)", _BY_IMAGES),
-    (r"(?m)^\s+cam_model:|^\s+type: omni", "SVO (old, or omni)", _BY_IMAGES),
-    (r"(?m)^cam0_calib:", "VINS-Fusion (settings)", _OTHER_FILE),
-    (r"<IntrinsicStandardCameraModel", "Motive", _AS_TEXT),
-    (r"<calibration[^>]*qtm-version", "Qualisys Track Manager", _AS_TEXT),
-    (r"<Camera [^>]*DEVICEID", "Vicon (XCP)", _BY_IMAGES),
-    (r"\A\s*Australis", "Australis", _BY_IMAGES),
-    (r"\A# Bundle file", "Bundler", _AS_TEXT),
-    (r"\"sfm_data_version\"", "OpenMVG", _AS_TEXT),
-    (r"\"pxFocalLength\"|\"distortionParams\"", "Meshroom", _AS_TEXT),
-    (r"\"CalibrationInformation\"", "Azure Kinect", _AS_TEXT),
-    (r"aslam_cv|reprojection error: \[", "Kalibr (results as text)", _AS_TEXT),
-    (r"camera(Parameters|Intrinsics)( with|\()", "MATLAB (code, display)", _AS_TEXT),
-    (r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", "ZED", _AS_TEXT),
-    (r"\"projection_type\"\s*:", "OpenSfM", _AS_TEXT),
-    (r"\"cameraData\"\s*:", "DepthAI (OAK-D)", _AS_TEXT),
-    (r"<document[^>]*>\s*<chunk", "Metashape", _OF_PROJECT),
-    (r"<projection>frame.*<fx>", "PhotoScan (before 1.2)", _AS_TEXT),
-    (r"\[ *\d+x\d+ +p\[|Intrinsic of \"", "RealSense (display)", _AS_TEXT),
-    (r"(?m)^\[narrow_stereo", "ROS (ost.txt)", _AS_TEXT),
-    (r"\barray\(\[", "Python (display)", _AS_TEXT),
-    (r"\A[\1-\x1f]\0{7}.\0{3}[\0-\x1f]\0{3}", "COLMAP (cameras.bin)", _AS_TEXT),
-    (r"(?m)^model_type:\W*(?i:scaramuzza)", "camodocal (Scaramuzza)", _BY_IMAGES),
-    (
-        r"\b(M1|IntrinsicMatrix1|[cC]ameraMatrix1|CameraParameters2|mtx_l)\b",
-        "a stereo pair",
-        _OF_PAIR,
-    ),
-    (r"(?m)^\W*K_\d+\W", "KITTI or EasyMocap", _OF_PAIR),
-    (r"(?m)\"camera_params\"|^camera_params *=", "COLMAP (settings)", _AS_TEXT),
-    (r"ensDistortionLookupTable", "Apple (AVFoundation)", _BY_IMAGES),
-    (r"\"intrinsic_type\"", "OpenCameraCalibrator", _BY_IMAGES),
-    (r"<OpticalProperties", "ContextCapture", _AS_TEXT),
-    (r"(?im)^Focal length:\s*(fc = *)?\[", "GML, Bouguet (display)", _AS_TEXT),
-    (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
-)
+_REMEDIES = {
+    "by-images": _BY_IMAGES,
+    "of-project": message("camera-file.of-project"),
+    "of-pair": message("camera-file.of-pair"),
+    "other-file": message("camera-file.other-file"),
+}
 
 
 def refuse_foreign(data: bytes, name: str) -> None:
     """Refuse the file of a program whose lens model or form is not read, by name."""
-    text = data[:100_000].decode("latin-1")
-    if data.startswith((BOM_UTF16_BE, BOM_UTF16_LE)):
-        text = text.replace("\0", "")
-    own = [(kind_of(data), _AS_TEXT)] if kind_of(data) else []
-    own += [(each, way) for mark, each, way in FOREIGN if re.search(mark, text, re.S)]
-    for program, remedy in own[:1]:
+    program, way = foreign_program(data, "cameras")
+    if program:
+        remedy = _REMEDIES.get(way, message("camera-file.as-text"))
         raise FileError(
             "camera-file.foreign", name=name, program=program, remedy=remedy
         )
@@ -353,9 +301,7 @@ def layout_of(entries: Entries) -> FileLayout | None:
 
 def _given(layout: FileLayout, entries: Entries) -> Given:
     lens, stated = _lens(layout, entries)
-    size = np.concatenate([_numbers(entries, path) for path in layout.size.split()])
-    if len(size) != 2:
-        raise FileError("camera-file.no-size", name=entries.name)
+    size = _size(layout.size.split(), entries)
     others = layout.of_fisheye if lens is KANNALA_BRANDT else {}
     named = _named(layout.numbers | others, entries)
     pinhole = _pinhole(named, size, layout, entries)
@@ -364,7 +310,29 @@ def _given(layout: FileLayout, entries: Entries) -> Given:
     if lens is None and any(named.get(name) for name in _RADIAL.split()):
         raise _unread(layout, stated, entries)
     lens = lens or BROWN
-    return Given((size[0], size[1]), pinhole, _coefficients(named, lens), lens)
+    return Given(size, pinhole, _coefficients(named, lens), lens)
+
+
+def _size(paths: list[str], entries: Entries) -> tuple[float, float]:
+    if not paths:
+        return size_of(entries)
+    size = np.concatenate([_numbers(entries, path) for path in paths])
+    if len(size) != 2:
+        raise FileError("camera-file.no-size", name=entries.name)
+    return size[0], size[1]
+
+
+def size_of(entries: Entries) -> tuple[float, float]:
+    """Return width and height of the images, px, under their usual names."""
+    if entries.has(*_SIZE) and not entries.has(*_WIDTH):
+        stated = entries.value(*_SIZE)
+        if isinstance(stated, dict) and "width" in stated:
+            return size_of(entries.part(*_SIZE))
+        width, height = entries.counted(2, *_SIZE)
+        return width, height
+    if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):
+        raise FileError("camera-file.no-size", name=entries.name)
+    return entries.counted(1, *_WIDTH)[0], entries.counted(1, *_HEIGHT)[0]
 
 
 def _named(numbers: dict[str, str], entries: Entries) -> dict[str, float]:
@@ -396,7 +364,10 @@ def _usual_distortion(entries: Entries, lens: LensModel | None) -> dict[str, flo
 
 
 def _pinhole(
-    named: dict[str, float], size: FloatArray, layout: FileLayout, entries: Entries
+    named: dict[str, float],
+    size: tuple[float, float],
+    layout: FileLayout,
+    entries: Entries,
 ) -> FloatArray:
     f = named.get(_FOCAL, named.get("fx"))
     if f is None:

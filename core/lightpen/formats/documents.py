@@ -51,7 +51,8 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
     elif re.match(_TOML, text):
         tree = parse_toml(text, name)
     elif re.match(_PYTHON, text):
-        tree = parse_yaml(re.sub(r"\bb'[^'\n]*'", "''", text), name)
+        text = re.sub(r"\bb'[^'\n]*'", "''", text)
+        tree = parse_yaml(re.sub(r"\(([-\d., ]*)\)", r"[\1]", text), name)
     elif start in ("{", "["):
         tree = parse_json(text, name)
     else:

@@ -6,9 +6,11 @@ import logging
 import os
 import re
 import stat
+import tomllib
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
@@ -63,37 +65,8 @@ _REASONS = {
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
 AN_IMAGE = "image"
-# How files begin that are none of those read here; the first that fits counts.
-_KINDS = (
-    (rb"#ROSBAG|\x89MCAP", "ROS bag"),
-    (rb"SQLite format 3", "SQLite (bag of ROS 2)"),
-    (rb"MATLAB 5\.0 MAT-file", "MATLAB (.mat)"),
-    (rb"\x89HDF|MATLAB 7\.3|(?s:.{512}\x89HDF)", "HDF5 (.mat, .h5)"),
-    (rb"\x93NUMPY|PK\x03\x04(?s:.{26,40})\.npy", "numpy"),
-    (rb"\x80[\x02-\x05](?s:.{1,12})(\x8c|\}|c)", "Python (pickle)"),
-    (rb"PK\x03\x04|\x1f\x8b|7z\xbc\xaf|Rar!", "archive (.zip, .gz)"),
-    (rb"\x89PNG|\xff\xd8\xff|II\*\0|MM\0\*|BM.{4}\0{4}", AN_IMAGE),
-    (rb"GIF8", "GIF"),
-    (rb"SIMPLE  =", "FITS"),
-    (rb"(?s:.{128})DICM", "DICOM"),
-    (rb"LUCAM-RECORDER", "SER (video)"),
-    (rb"\xed\xfe\0\0N\0o\0r\0p\0i\0x\0", "Norpix sequence"),
-    (rb"CI[\x2c-\x40]\0", "Phantom (.cine)"),
-    (rb"\x76\x2f\x31\x01", "OpenEXR"),
-    (rb".{4}ftyp", "HEIC, AVIF or video"),
-    (rb"%PDF", "PDF"),
-    (rb"[\x02-\x7f]\x50", "C3D"),
-    (rb"version https://git-lfs", "Git LFS (pointer to the file)"),
-    (rb"(?i)\s*<(!doctype )?html", "HTML (a web page)"),
-    (rb"ISO-10303-21", "STEP"),
-    (rb".{72}S {6}1", "IGES"),
-    (rb"\s*0\r?\n\s*SECTION", "DXF"),
-    (rb"(#.*\n|[go] .*\n)*v +[-\d]", "OBJ (surface)"),
-    (rb"ply\r?\n", "PLY (point cloud)"),
-    (rb"solid ", "STL (surface)"),
-    (rb"scorer,", "DeepLabCut (wide table)"),
-)
 HEAD = 1000  # bytes, that tell the kind of a file
+SEARCHED = 100_000  # bytes, that tell the program
 
 _logger = logging.getLogger(__name__)
 
@@ -156,8 +129,27 @@ def read_text(path: Path, what: Message, limit: int) -> str:
 
 def kind_of(data: bytes) -> str:
     """Return the kind of a file that is not read here, from its start, or ``""``."""
-    start = data[:HEAD].removeprefix(BOM_UTF8)
-    return next((kind for mark, kind in _KINDS if re.match(mark, start)), "")
+    return foreign_program(data[:HEAD])[0]
+
+
+def foreign_program(data: bytes, content: str = "any") -> tuple[str, str]:
+    """Return the program of a file that is not read here, and what to do, or ``""``.
+
+    ``content`` is one of the lists of ``foreign.toml``; any file may be of ``any``.
+    """
+    text = data[:SEARCHED].removeprefix(BOM_UTF8).decode("latin-1")
+    if data.startswith((BOM_UTF16_BE, BOM_UTF16_LE)):
+        text = text[2:].replace("\0", "")
+    known = _foreign()
+    for mark, program, *way in (*known[content], *known["any"]):
+        if re.search(mark, text):
+            return program, "".join(way)
+    return "", ""
+
+
+@cache
+def _foreign() -> dict[str, list[list[str]]]:
+    return tomllib.loads(Path(__file__).with_name("foreign.toml").read_text("utf-8"))
 
 
 def write_whole(path: Path, data: bytes) -> None:

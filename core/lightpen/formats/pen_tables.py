@@ -11,7 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import kind_of
+from lightpen.formats.files import foreign_program
 from lightpen.formats.tables import Table, is_workbook, number_flaw
 from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
@@ -125,10 +125,10 @@ _NORMALS = (("nx",), ("ny",), ("nz",))
 _ACTUAL = r"(?:actual|act|measured|meas|istwert|ist)"
 _OF_PLAN = r"(nominal|nom|sollwert|soll)"
 _COLUMN = (
-    rf"(?:{_ACTUAL}[\s_]+|{_OF_PLAN}[\s_]+)?"
+    rf"(?:{_ACTUAL}[\s_-]+|{_OF_PLAN}[\s_-]+)?"
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
     r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value|wert))?"
-    rf"(?:[\s_]*{_ACTUAL}|[\s_]*{_OF_PLAN})?"
+    rf"(?:[\s_-]*{_ACTUAL}|[\s_-]*{_OF_PLAN})?"
     r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
 _OTHER_COORDINATE = r"[xyz]\b(?! nominal|.*(tol|dev|diff|abw|err|sigma|std))"
@@ -300,12 +300,6 @@ _NORMAL_FIELDS = ("normal", "direction", "dir")
 _IDS = ("id", "led", "number", "name", "label", "marker")
 _AXES = ("x", "y", "z")
 _ROM = b"NDI\x00"
-_FOREIGN = (  # how files begin that cannot be read
-    (rb"\s*<", "XML (Motive, Vicon)"),
-    (rb"\s*Format Version,", "Motive (CSV)"),
-    (rb"(\s*\[\w+\]\s*\n)+\s*\w+\s*=", "INI (Atracsys)"),
-    (rb"# Markups fiducial|\s*{\s*\"@schema\"", "3D Slicer (markups)"),
-)
 
 
 class Markers(NamedTuple):
@@ -320,9 +314,8 @@ def refuse_foreign_list(data: bytes, name: str) -> None:
     """Refuse the file of a program whose points cannot be read, by name."""
     if data.startswith(_ROM):
         raise FileError("pen-file.rom", name=name)
-    start = data.removeprefix(b"\xef\xbb\xbf")
-    own = next((program for mark, program in _FOREIGN if re.match(mark, start)), "")
-    if program := own or kind_of(b"" if is_workbook(data) else data):
+    start = b"" if is_workbook(data) else data
+    if program := foreign_program(start, "pens")[0]:
         raise FileError("pen-file.foreign", name=name, program=program)
 
 

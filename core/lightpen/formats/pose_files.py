@@ -17,7 +17,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import kind_of, opened
+from lightpen.formats.files import foreign_program, opened
 from lightpen.formats.pose_columns import (
     STATE,
     ToolColumns,
@@ -38,18 +38,6 @@ LONGEST_HEADER = 64_000_000  # bytes
 NOTHING_BELOW = -1e20  # NDI writes -3.7e28 for what it does not see
 MAX_TOOLS = 20
 
-_FOREIGN = (
-    (r"\A\s*\[\[[^,\]]*\]", "numpy (display)"),
-    (r"\A\s*[\[{]", "JSON"),
-    (r"\Afr \d+\s*\n(ts|6d)", "DTrack (ART)"),
-    (r"\A\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\S+[ \t]+){3}\S+[ \t]*\n", "Open3D (.log)"),
-    (r"\A#Insight Transform", "ITK"),
-    (r"\ANO_OF_FRAMES", "Qualisys Track Manager (6D)"),
-    (r"\APathFileType", "TRC (markers)"),
-    (r"\A(Trajectories|Joints|Segments|Objects)\b", "Vicon"),
-    (r"\A(---\s*)?header:\s", "ROS (text)"),
-    (r"\A# Image list with two lines", "COLMAP (images.txt)"),
-)
 _TRANSFORM = r"(?m)^Seq_Frame(\d+)_(\w+?)Transform(Status)?\s*:?=\s*(.+?)\s*$"
 _TOOL_COLUMN = r"(?:tool|handle|rigid|object|sensor|target|body|device|port).*"
 
@@ -67,9 +55,7 @@ class GivenPoses:
 
 def refuse_foreign_poses(head: bytes, name: str) -> None:
     """Refuse poses in a form that is not read, by its name."""
-    text = head.decode("latin-1").removeprefix("\xef\xbb\xbf")
-    own = next((program for mark, program in _FOREIGN if re.search(mark, text)), "")
-    if program := own or kind_of(head):
+    if program := foreign_program(head, "poses")[0]:
         raise FileError("poses.foreign", name=name, program=program)
 
 

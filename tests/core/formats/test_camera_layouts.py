@@ -288,6 +288,37 @@ GYROFLOW: dict[str, Any] = {
             id="the size beside the camera",
         ),
         pytest.param(
+            {
+                "cameraMatrix": dict(
+                    zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True)
+                ),
+                "distortionCoefficients": NUMBERS,
+                "imageSize": SIZE_NAMED,
+            },
+            id="names below names",
+        ),
+        pytest.param(
+            {"camera_resolution": SIZE, "camera_matrix": MATRIX, "dist_coeffs": BROWN},
+            id="size of interactive calibration",
+        ),
+        pytest.param(
+            {
+                "cameras": [
+                    {
+                        "image_dimension": SIZE,
+                        "distortion_coefficients": BROWN,
+                        "distortion_type": "radialtangential",
+                        "focal_length": PINHOLE[:2],
+                        "principal_point": PINHOLE[2:],
+                    }
+                ]
+            },
+            id="OKVIS",
+        ),
+        pytest.param(
+            f"{{'K': {MATRIX}, 'dist': {[*BROWN]}, 'size': {SIZE}}}\n", id="Python"
+        ),
+        pytest.param(
             {"Camera": {"model": "perspective", "cols": 1280, "rows": 720} | NUMBERS},
             id="stella_vslam",
         ),
@@ -479,6 +510,7 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ({"intrinsic_type": "DIVISION_UNDISTORTION"}, "OpenCameraCalibrator"),
         ("<OpticalProperties version='1.0'><Id>0</Id></OpticalProperties>", "Context"),
         ("Project: a\nFocal length: [ 4640.0 4635.5 ] +/- [ 1 1 ]\n", "GML"),
+        ({"cameraMatrix": MATRIX, "D": BROWN, "projection": FLAT}, "image size"),
         ({"w": 1280, "h": 720, "K": MATRIX}, "does not state the distortion"),
         ({**REALSENSE, "coeffs": [], "dist": {"a": 1}}, "not state the distortion"),
     ],

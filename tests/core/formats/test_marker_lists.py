@@ -154,6 +154,11 @@ def cmm(columns: str, values: str, units: str = "") -> str:
         ),
         ("X-Koordinate;Y-Koordinate;Z-Koordinate", "{x};{y};{z}", ";mm;mm;mm"),
         ("X-Wert;Y-Wert;Z-Wert", "{x};{y};{z}", ";mm;mm;mm"),
+        (
+            "X-Soll;X-Ist;Y-Soll;Y-Ist;Z-Soll;Z-Ist",
+            "{nx};{x};{ny};{y};{nz};{z}",
+            ";mm;mm;mm;mm;mm;mm",
+        ),
     ],
 )
 def test_the_actual_coordinates_of_a_report_are_taken(
