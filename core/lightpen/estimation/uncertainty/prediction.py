@@ -16,7 +16,7 @@ from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, one_step
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of
-from lightpen.estimation.bundle.unknowns import NO_COMPONENTS
+from lightpen.estimation.bundle.unknowns import NO_COMPONENTS, find_components
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
@@ -88,12 +88,16 @@ def predict_uncertainty(
 def _with_priors(bundle: Bundle, priors: Priors) -> Bundle:
     """Return the adjustment after a single step with other priors."""
     unknowns = replace(bundle.unknowns, priors=priors)
-    prior = unknowns.prior_information(bundle.components)
-    covariance = inverse(bundle.information + prior)
+    information, right = bundle.information, bundle.right
+    components = find_components(unknowns, information, right, bundle.components)
+    prior = unknowns.prior_information(components)
+    covariance = inverse(information + prior)
     return replace(
         bundle,
         unknowns=unknowns,
-        values=covariance @ (bundle.right + unknowns.prior_right()),
+        components=components,
+        budget_components=components,
+        values=covariance @ (right + unknowns.prior_right()),
         prior_information=prior,
         covariance=covariance,
     )

@@ -86,8 +86,7 @@ def test_the_uncertainty_during_the_swing_is_that_of_the_verdict(
         *(rig_of(camera), PEN, np.arange(n_images), pixels[:, None]),
         *(swing.rotations, swing.translations),
     )
-    # The average over the sizes of fields is of one step here, of all there.
-    assert together.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.03)
+    assert together.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.01)
     # What fields of the images may be was found with the images until then.
     assert kept.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.07)
     assert 0 < kept.predicted.floor < kept.uncertainty
