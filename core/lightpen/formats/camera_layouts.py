@@ -219,12 +219,12 @@ LAYOUTS = (
         lens=KANNALA_BRANDT,
     ),
     FileLayout(
-        "names alone",
+        "another program",
         marks="fx fy cx cy",
         numbers=_each(f"fx fy cx cy skew {_RADIAL}"),
         model="distortion_model|camera_model|model",
         brown="plumbbob radtan brown brownconrady opencv pinhole rationalpolynomial "
-        "perspective",
+        "perspective pinholeradtan",
         fisheye="equidistant fisheye kannalabrandt opencvfisheye",
     ),
 )

@@ -39,8 +39,8 @@ _SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}
 _VECTORS = {"rvec", "rotvec", "rodrigues"}
 _ANGLE = r"(euler_?|rot_?)?(roll|pitch|yaw|r?[xyz]|[abc])([\W_]+(deg|rad)\w*\W?)?"
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
-STATE = r".*(state|status|valid|visible|visibility|tracked).*"
-_FLAG = r"valid|visib|tracked"  # 0 says no; as a state, it may say that all is well
+STATE = r".*(state|status|valid|visible|visibility|tracked|tracking|\bok|_ok\b).*"
+_FLAG = r"valid|visib|track|ok\b"  # 0 says no; as a state, it may say that all is well
 _LOST = (
     r"(?i)(missing|invalid|lost|disabled|occluded|false|not|no\b|bad|fail|error|out"
     r"|untracked|unknown|nan).*"

@@ -1,6 +1,6 @@
 """Poses as trackers and other programs write them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -128,10 +128,16 @@ def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> No
     assert (found.places.tolist(), found.n_lost) == ((kept + 1).tolist(), 1)
 
 
-def test_a_pose_that_a_flag_calls_invalid_is_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "states"),
+    [("tool is visible", "012"), ("tracking_ok", ["False", "True", "True"])],
+)
+def test_a_pose_that_a_flag_calls_invalid_is_left_out(
+    tmp_path: Path, name: str, states: Sequence[str]
+) -> None:
     path = tmp_path / "poses.csv"
-    rows = [f"{i % 3},1,0,0,0,{i + 1},2,900" for i in range(6)]
-    path.write_text("\n".join(["tool is visible,qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
+    rows = [f"{states[i % 3]},1,0,0,0,{i + 1},2,900" for i in range(6)]
+    path.write_text("\n".join([f"{name},qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
 
     assert read_poses(path).places.tolist() == [2, 3, 5, 6]
 
