@@ -14,6 +14,7 @@ from benchmarks.held_out_views import held_out_rows
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
 from tests.simulated_boards import expose_board, render_board, simulate_board_poses
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -28,12 +29,7 @@ from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import Views, observe_board
 from lightpen_extensions.simulator.scenes import Sensor
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 SET_BOARD = "chessboard:11x8:20"
 FOCAL_LIMIT, CENTER_LIMIT, RMS_LIMIT, N_VIEWS = 0.15, 0.4, 0.03, 24  # px

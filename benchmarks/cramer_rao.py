@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.tips import one_step
 from benchmarks.workers import Workers
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.observations import observe_centers
@@ -21,7 +22,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

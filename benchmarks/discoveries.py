@@ -12,6 +12,7 @@ from benchmarks.rows import Row, numbers
 from benchmarks.tips import UM
 from benchmarks.workers import Workers
 from tests.simulated_disturbances import plan_disturbed
+from tests.simulated_leds import with_leds
 from tests.simulated_stations import (
     EXACT,
     Station,
@@ -20,6 +21,7 @@ from tests.simulated_stations import (
     random_station,
     seen_again,
 )
+from tests.simulated_swings import plan_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -34,8 +36,7 @@ from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import find_spots
-from lightpen_extensions.simulator.image_plans import plan_scene
-from lightpen_extensions.simulator.scenes import LEDS, Scene
+from lightpen_extensions.simulator.scenes import Scene
 
 N_STATIONS = 120  # give the coverage to 2 %
 N_AGAIN = 60  # of them, whose files calibrate the tip again
@@ -233,15 +234,11 @@ def rendered_rows(errors: Sequence[tuple[float, float]]) -> list[Row]:
 def rendered_error(looks_and_seed: tuple[str, int]) -> tuple[float, float]:
     """Return the error of the tip of a rendered swing, µm, and its share of U."""
     looks, seed = looks_and_seed
-    leds = LEDS.get(looks, LEDS["even"])
-    scene = Scene(
-        n_images=N_IMAGES,
-        seed=seed,
-        swing="operator",
-        faces=leds.faces,
-        optics=leds.optics,
-    )
-    plan = plan_disturbed(scene) if looks == "hard" else plan_scene(scene)
+    scene = Scene(n_images=N_IMAGES, seed=seed)
+    if looks == "hard":
+        plan = plan_disturbed(scene, kind="operator")
+    else:
+        plan = plan_kind(with_leds(scene, looks), "operator")
     pen = scene.pen
     longest = float(np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2).max())
     request = Request((MeasuredLength(None, longest, EXACT),), pen.diameter)

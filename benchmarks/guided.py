@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 from benchmarks.rows import Row
 from benchmarks.workers import Workers
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers
@@ -28,7 +29,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

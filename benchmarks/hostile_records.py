@@ -25,6 +25,7 @@ from benchmarks.json_mutations import flipped, mutated
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 from benchmarks.small_records import small_record
+from tests.simulated_centers import simulate_centers
 
 from lightpen.errors import LightpenError
 from lightpen.estimation.reports.verdict import Grade
@@ -42,12 +43,7 @@ from lightpen.swing.swing_recorder import read_resumable, record_header
 from lightpen_app.work.settings import Settings, Station
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 SEED = 11
 N_FLIPS, N_MUTATIONS = 2000, 5000

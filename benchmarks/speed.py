@@ -3,7 +3,7 @@
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +21,8 @@ from benchmarks.peers import (
 )
 from benchmarks.rows import Row, without_data
 from benchmarks.workers import Workers, elapsed_ms, median_ms
+from tests.simulated_centers import simulate_centers
+from tests.simulated_leds import LEDS, with_leds
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
@@ -42,12 +44,8 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 from lightpen.swing.capture.kept_images import AcceptedImages, keep, kept_before
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
-from lightpen_extensions.simulator.scenes import LEDS, Scene
-from lightpen_extensions.simulator.swings import (
-    leds_in_camera,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import leds_in_camera, swing_poses
 
 N_IMAGES = 50  # of the camera, at 20 a second
 FRAME_RATE = 20.0
@@ -247,8 +245,8 @@ def _image_times() -> _ImageTimes:
 def _look_times() -> dict[str, _LookTimes]:
     """Return the times of each look of LEDs."""
     times = {}
-    for name, look in LEDS.items():
-        scene = replace(SCENE, faces=look.faces, optics=look.optics)
+    for name in LEDS:
+        scene = with_leds(SCENE, name)
         plans = [live_plan(scene, i, i / FRAME_RATE) for i in range(N_IMAGES)]
         images = [render_plan(scene, plan) for plan in plans]
         detections = [detect_pen(image, CAMERA, PEN) for image in images]

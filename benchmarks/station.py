@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.workers import Workers
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -31,7 +32,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     seen_from,
-    swing_poses,
 )
 
 N_WAVES = 60  # of a lens field
@@ -222,11 +222,11 @@ def calibrated(
     pen = paper_pen()
     if n_cameras == 1:
         rig = rig_of(paper_camera())
-        swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
+        swing = swing_of_kind(n_images, rng, kind)  # type: ignore[arg-type]
     else:
         row = row_of_cameras(n_cameras, BASELINE)
         rig = from_first(row)
-        swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
+        swing = swing_of_kind(n_images, rng, kind)  # type: ignore[arg-type]
         swing = seen_from(swing, row.rotations[0], row.translations[0])
     pixels, truth = _centers(effects, rig, pen, swing, rng)
     file, pen_file = drawn_rig(rig, rng), _drawn_pen(effects, pen, rng)

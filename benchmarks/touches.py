@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.station import BASELINE, drawn_rig
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -32,7 +33,6 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
     perturbed_pen,
     seen_from,
-    simulate_centers,
     swing_poses,
 )
 

@@ -7,12 +7,12 @@ import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
 from tests.simulated_centers import correlated_noise
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import PoseTable, read_poses
-from lightpen_extensions.simulator.swings import swing_poses
 
 # scikit-surgerycalibration, algebraic one-step, in its tests
 PUBLISHED_TIP = np.array([-14.476, 395.143, -7.558])  # mm
@@ -43,7 +43,7 @@ def tracker_rows(workers: Workers, data: Path | None) -> list[Row]:
 def _is_covered(seed: int, correlation: float) -> BoolArray:
     """Return whether U covers the error of a calibration, per axis."""
     rng = np.random.default_rng(seed)
-    swing = swing_poses(N_POSES, rng, "operator")
+    swing = swing_of_kind(N_POSES, rng, "operator")
     noise = NOISE * correlated_noise(N_POSES, correlation, rng)
     found = calibrate_pivot(swing.rotations, swing.translations + noise)
     error = np.abs(found.fit.tip_pen - swing.tip_pen)

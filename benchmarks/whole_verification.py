@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pen_detection import detect_pen
@@ -23,7 +24,7 @@ from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import Conditions, VerificationChoices
 from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.workers import Workers
-from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_centers import simulate_centers, simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -37,7 +37,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     seen_from,
-    simulate_centers,
     swing_poses,
 )
 

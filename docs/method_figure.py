@@ -14,17 +14,13 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter, QPen
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 from lightpen_resources import RESOURCES
 
 FILE = RESOURCES / "help" / "en" / "method.png"

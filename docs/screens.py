@@ -37,6 +37,7 @@ from msgspec import structs
 from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool, QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
+from tests.simulated_centers import simulate_centers
 from typing_extensions import override
 
 from lightpen.archive.chains import Event, Kind, append
@@ -84,7 +85,6 @@ from lightpen_extensions.simulator.hand import (
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
-from lightpen_extensions.simulator.swings import simulate_centers
 from lightpen_program.extensions import faces
 from lightpen_resources import languages
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -30,7 +31,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     perturbed_pen,
-    simulate_centers,
     swing_poses,
 )
 

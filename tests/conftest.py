@@ -351,12 +351,13 @@ def scene(
 ) -> Callable[..., Path]:
     """Return a function that simulates a set with `options`, each set once.
 
-    After ``hard`` or ``clean`` they are number of images, seed, binning and pen.
+    After ``hard``, ``clean`` or a kind of swing they are number of images, seed,
+    binning, pen and, if not 8, bits of a pixel.
     """
 
     def simulated(*options: str) -> Path:
         def simulate(folder: Path) -> None:
-            if options[0] in ("hard", "clean"):
+            if not options[0].startswith("-"):
                 _write_set(folder / "set", *options)
                 return
             outcome = lightpen("simulate", folder / "set", *options)
@@ -368,17 +369,33 @@ def scene(
 
 
 def _write_set(
-    folder: Path, kind: str, n_images: str, seed: str, binning: str, pen: str
+    folder: Path,
+    kind: str,
+    n_images: str,
+    seed: str,
+    binning: str,
+    pen: str,
+    bits: str = "8",
 ) -> None:
     from tests.simulated_disturbances import HARD, Disturbances, write_disturbed
     from tests.simulated_pens import SAMPLE_PENS
+    from tests.simulated_swings import plan_kind
 
-    from lightpen_extensions.simulator.scenes import Scene
+    from lightpen_extensions.simulator.scene_files import write_plan
+    from lightpen_extensions.simulator.scenes import Scene, Sensor
     from lightpen_extensions.simulator.swings import paper_camera
 
-    camera = paper_camera(int(binning))
-    scene = Scene(int(n_images), int(seed), pen=SAMPLE_PENS[pen](), camera=camera)
-    write_disturbed(scene, folder, HARD if kind == "hard" else Disturbances())
+    scene = Scene(
+        int(n_images),
+        int(seed),
+        sensor=Sensor(bits=int(bits)),  # type: ignore[arg-type]
+        pen=SAMPLE_PENS[pen](),
+        camera=paper_camera(int(binning)),
+    )
+    if kind in ("hard", "clean"):
+        write_disturbed(scene, folder, HARD if kind == "hard" else Disturbances())
+    else:
+        write_plan(plan_kind(scene, kind), folder)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="session")
@@ -462,6 +479,7 @@ def stated() -> dict[str, Any]:
     """
     import numpy as np
     from benchmarks.small_records import entries_of
+    from tests.simulated_centers import simulate_centers
 
     from lightpen.estimation.reports.report import calibration_record
     from lightpen.formats.opened_files import InputFile, Inputs
@@ -474,9 +492,7 @@ def stated() -> dict[str, Any]:
     poses = swings.swing_poses(60, rng)
     translations = poses.translations.copy()
     translations[5] += [0.5, 0, 0]
-    pixels = swings.simulate_centers(
-        *(camera, pen, poses.rotations, translations), 0.02, rng
-    )
+    pixels = simulate_centers(*(camera, pen, poses.rotations, translations), 0.02, rng)
     pixels[3, 2:] = np.nan
     calibration = calibrate_pixels(pixels, camera, pen)
     file = InputFile(Path("folder/file.csv"), 64 * "0")

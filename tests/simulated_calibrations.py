@@ -5,7 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tests.simulated_centers import observe_pixels, simulate_rig_centers
+from tests.simulated_centers import (
+    observe_pixels,
+    simulate_centers,
+    simulate_rig_centers,
+)
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
@@ -28,7 +32,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     seen_from,
-    simulate_centers,
     swing_from_postures,
     swing_poses,
 )

@@ -9,9 +9,37 @@ from lightpen.detection.observations import Observations, observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig
-from lightpen_extensions.simulator.swings import Swing, seen_from, simulate_centers
+from lightpen_extensions.simulator.swings import (
+    Swing,
+    faces_camera,
+    inside_image,
+    leds_in_camera,
+    seen_from,
+)
+
+
+def simulate_centers(
+    camera: Camera,
+    pen: Pen,
+    rotations: FloatArray,
+    translations: FloatArray,
+    sigma: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return measured centres (F, L, 2) of the LEDs, px, without rendering an image.
+
+    The exact centre of each disc's elliptic image plus independent Gaussian noise,
+    sigma px per coordinate. LEDs that face away or lie outside the image are NaN. The
+    poses cam_from_pen are rotations (F, 3, 3) and translations (F, 3), mm.
+    """
+    leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
+    centers = ellipse_centers(camera, leds_cam, normals_cam, pen.diameter / 2)
+    seen = faces_camera(leds_cam, normals_cam) & inside_image(camera, centers)
+    noise = sigma * rng.standard_normal(centers.shape)
+    return np.where(seen[..., None], centers + noise, np.nan)
 
 
 def correlated_noise(

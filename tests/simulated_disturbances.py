@@ -11,29 +11,34 @@ from pathlib import Path
 import cv2
 import numpy as np
 import numpy.typing as npt
+from tests.simulated_lights import Defocus, Lamp
+from tests.simulated_swings import SwingKind, scene_swing
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.faces import LightArray, disc_contours
 from lightpen_extensions.simulator.image_plans import (
     FRAME,
     SWING,
     ImagePlan,
     ScenePlan,
     image_stream,
-    led_faces,
     led_gains,
     plan_swing,
     stream,
-    swing_of,
 )
-from lightpen_extensions.simulator.render import clipped
+from lightpen_extensions.simulator.render import (
+    LightArray,
+    Optics,
+    View,
+    Window,
+    clipped,
+    disc_contours,
+)
 from lightpen_extensions.simulator.scene_files import write_plan
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import Swing, leds_in_camera
-from lightpen_extensions.simulator.view import Lamp, Optics, View, Window
 
 CAP_STEPS = 16  # corners of a round finger end
 OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
@@ -102,13 +107,13 @@ class Glare:
     level: float  # fraction of full scale
     softness: float = 1.0  # standard deviation of its edges, px
 
-    def draw(self, levels: LightArray, exposure: float) -> list[Window]:
+    def draw(self, levels: LightArray, optics: Optics) -> list[Window]:
         """Add its light."""
         window = _window_round(levels, self.outline, self.softness)
         if window is None:
             return []
         mask = _soft_polygon(window, self.outline, self.softness)
-        levels[window.slices] += np.float32(self.level * exposure) * mask
+        levels[window.slices] += np.float32(self.level * optics.exposure) * mask
         return [window]
 
 
@@ -130,7 +135,7 @@ class Finger:
         cap = self.radius * np.stack([np.cos(half_turn), np.sin(half_turn)], axis=-1)
         return np.concatenate([self.end + cap, self.start - cap])
 
-    def draw(self, levels: LightArray, exposure: float) -> list[Window]:
+    def draw(self, levels: LightArray, optics: Optics) -> list[Window]:
         """Hide what is behind it."""
         window = _window_round(levels, self.outline, self.softness)
         if window is not None:
@@ -146,13 +151,15 @@ class DisturbedImage(ImagePlan):
     flags: tuple[str, ...] = ()  # names of the `Disturbances` it suffers
 
 
-def plan_disturbed(scene: Scene, disturbances: Disturbances = HARD) -> ScenePlan:
+def plan_disturbed(
+    scene: Scene, disturbances: Disturbances = HARD, kind: SwingKind = "field"
+) -> ScenePlan:
     """Draw everything random of a disturbed scene but the noise; always the same.
 
     Its images are `DisturbedImage`.
     """
     rng, n = stream(scene, SWING), scene.n_images
-    swing = swing_of(scene, rng)
+    swing = scene_swing(scene, rng, kind)
     hit = _draw_hits(disturbances, n, rng)
     swing = slip_tip(swing, hit["slipped"], rng.uniform(*SLIP, n), rng)
     plan = plan_swing(scene, swing)
@@ -253,11 +260,12 @@ def _plan_image(
     if "blurred_away" in flags:
         moved = AWAY_MOTION
         optics = replace(optics, psf_sigma=AWAY_SIGMA)
+    blur = (Defocus(rng.uniform(*DEFOCUS)),) if "defocus" in flags else ()
     still = replace(scene, optics=_disturbed_optics(optics, flags, rng))
     turn = _turn_that_moves(still, rotation, translation, moved, rng)
     image_plan = plan_in_motion(still, index, rotation, translation, turn)
     view = _disturbed_view(
-        replace(image_plan.view, gains=gains),
+        replace(image_plan.view, gains=gains, others=blur),
         _discs(scene, image_plan),
         scene.camera,
         flags,
@@ -276,8 +284,6 @@ def _plan_image(
 def _disturbed_optics(
     optics: Optics, flags: tuple[str, ...], rng: np.random.Generator
 ) -> Optics:
-    if "defocus" in flags:
-        optics = replace(optics, defocus_radius=rng.uniform(*DEFOCUS))
     if "saturated" in flags:
         brighter = rng.uniform(*SATURATED_EXPOSURE)
         optics = replace(optics, exposure=optics.exposure * brighter)
@@ -305,7 +311,7 @@ def _disturbed_view(
     if "clutter" in flags:
         lamps = random_lamps(camera, discs, rng)
         glares = random_glares(camera, discs, rng)
-        view = replace(view, lamps=view.lamps + lamps, others=glares)
+        view = replace(view, others=(*lamps, *view.others, *glares))
     if "fingers" in flags:
         view = replace(view, others=(*view.others, random_finger(discs, rng)))
     return view
@@ -358,7 +364,7 @@ def plan_in_motion(
     rotations, translations = moving_poses(
         rotation, translation, scene.tip_pen, turn, n_times
     )
-    view = View(rotations, translations, led_gains(scene), faces=led_faces(scene))
+    view = View(rotations, translations, led_gains(scene))
     return ImagePlan(index, view, scene.optics, rotation, translation)
 
 

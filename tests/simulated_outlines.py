@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen_extensions.simulator.faces import Contours
+from lightpen_extensions.simulator.render import Contours
 
 
 @dataclass(frozen=True, eq=False)

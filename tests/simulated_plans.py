@@ -7,9 +7,9 @@ from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import vector_from_rotation
 from lightpen_extensions.simulator.image_plans import ImagePlan
+from lightpen_extensions.simulator.render import View
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import operator_postures
-from lightpen_extensions.simulator.view import View
 
 
 def live_plan(

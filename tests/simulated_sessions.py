@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 from msgspec import structs
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -51,7 +52,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
-    simulate_centers,
     swing_poses,
 )
 

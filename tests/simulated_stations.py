@@ -5,6 +5,8 @@ from itertools import permutations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from tests.simulated_centers import simulate_centers
+from tests.simulated_swings import FRAME_RATE
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.model.camera import Camera
@@ -15,11 +17,9 @@ from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.tracks import Sightings, sightings_of_centers
 from lightpen_extensions.simulator.swings import (
-    FRAME_RATE,
     Postures,
     Swing,
     operator_postures,
-    simulate_centers,
     swing_from_postures,
 )
 

@@ -533,9 +533,9 @@ def test_a_simulated_set_has_the_files_of_the_shared_sets(
         "--images -5",
         "--seed -1",
         "--images 2.5",
-        "--leds square",
-        "--led-diameter 0",
-        "--blur nan",
+        "--binning 3",
+        "--cameras 0",
+        "--baseline nan",
     ],
 )
 def test_a_senseless_simulation_is_refused(

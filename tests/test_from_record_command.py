@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.own_json import with_checksum
 from lightpen.record.swings.writing import note_excluded
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 Run = Callable[..., CompletedProcess[str]]
 # The fits begin at other poses than those that the images gave, and end as close as

@@ -9,17 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_camera
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA = paper_camera()
 # In no known layout, so that its file is not refused at once.

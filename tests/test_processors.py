@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.pen_files import write_pen
@@ -20,7 +21,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

@@ -200,7 +200,7 @@ def test_images_without_any_pen_are_refused(
 def test_images_of_any_depth_give_the_tip_to_8_um(
     bits: str, scene: Scene, record: Record, truth: Truth
 ) -> None:
-    folder = scene(*SMALL, "--bits", bits, "--images", "12", "--seed", "8")
+    folder = scene("clean", "12", "8", "2", "paper", bits)
     image = cv2.imread(str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED)
     assert image is not None
     assert image.dtype == (np.uint8 if bits == "8" else np.uint16)
@@ -215,7 +215,7 @@ def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
     scene: Scene, lightpen: Run
 ) -> None:
     for seed in ("1", "2", "3"):
-        folder = scene(*SMALL, "--swing", "upright", "--images", "12", "--seed", seed)
+        folder = scene("upright", "12", seed, "2", "paper")
         outcome = calibrate_set(lightpen, folder)
         assert_refused(outcome, "tilt|lean")
 
@@ -224,7 +224,7 @@ def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
 def test_degenerate_swings_are_refused_by_either_method(
     method: str, scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    folder = scene(*SMALL, "--swing", "one-axis", "--images", "12", "--seed", "1")
+    folder = scene("one-axis", "12", "1", "2", "paper")
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--method", method, "--json", str(file))
     assert outcome.returncode == 1

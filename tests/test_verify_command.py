@@ -10,16 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.swings import (
-    PAPER_CONE,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import PAPER_CONE, swing_poses
 
 Run = Callable[..., CompletedProcess[str]]
 N_RUNS = 8

@@ -28,15 +28,10 @@ from lightpen.messages import SWING_TO_SEAT
 from lightpen.model.rigid import FIRST_LEAN, UPRIGHT, Posture, Rig
 from lightpen.swing.capture.state import Phase, SwingState
 from lightpen_extensions.simulator.hand import HandPose, SimulatedOperator
-from lightpen_extensions.simulator.image_plans import (
-    ImagePlan,
-    led_faces,
-    led_gains,
-    render_plan,
-)
+from lightpen_extensions.simulator.image_plans import ImagePlan, led_gains, render_plan
+from lightpen_extensions.simulator.render import OtherLight, View
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import leds_in_camera
-from lightpen_extensions.simulator.view import Lamp, View
 
 GENTLE_LEANS = tuple(Posture(0.2, i * 2 * pi / 3, 0.0) for i in range(3))
 LEAN_TIME = 0.6  # s until the next one
@@ -109,8 +104,8 @@ class SimulatedCamera:
         Must use the same clock.
     rig : Rig, optional
         The camera is the second of it, and the scene before the first.
-    lamps : tuple of Lamp
-        Foreign lights in the picture.
+    others : tuple of OtherLight
+        In the picture.
     """
 
     def __init__(
@@ -119,7 +114,7 @@ class SimulatedCamera:
         clock: Clock | None = None,
         operator: SimulatedOperator | None = None,
         *,
-        lamps: tuple[Lamp, ...] = (),
+        others: tuple[OtherLight, ...] = (),
         serial: str = SERIAL,
         rig: Rig | None = None,
     ) -> None:
@@ -133,10 +128,9 @@ class SimulatedCamera:
         self.operator = operator or SimulatedOperator(
             self._clock, self.scene.seed, n_leds=n_leds
         )
-        self._lamps = lamps
+        self._others = others
         self._serial = serial
         self._gains = led_gains(self.scene)
-        self._faces = led_faces(self.scene)
         self._settings = self._usual_settings
         self._stats = Stats()
         self.is_seen = True  # displayed; else fewer images are made
@@ -331,7 +325,7 @@ class SimulatedCamera:
             shown = self._poses(scene, self.operator.held(between))
         gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
         gains[[led - 1 for led in held.covered]] = 0
-        view = View(*shown, gains, self._lamps, faces=self._faces)
+        view = View(*shown, gains, self._others)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
 
     def _poses(self, scene: Scene, held: HandPose) -> tuple[FloatArray, FloatArray]:

@@ -1,17 +1,13 @@
 """``lightpen simulate``: write a simulated swing."""
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 from lightpen.commands.arguments import number_from, whole_number
 from lightpen.commands.console import printing, progress, shown
-from lightpen.model.pen import DISC_DIAMETER
 
-LED_DIAMETERS = (2.0, 12.0)  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
-BLURS = (0.3, 8.0)  # px, of simulated optics
 MAX_RENDERED = 30_000  # images
 
 
@@ -32,35 +28,6 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         default=0,
         metavar="S",
         help="seed of the random numbers (0)",
-    )
-    parser.add_argument(
-        "--swing",
-        choices=("field", "cone", "operator", "one-axis", "upright"),
-        default="field",
-        help="motion of the pen",
-    )
-    parser.add_argument(
-        "--leds",
-        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost", "board"),
-        default="even",
-        help="appearance of the LEDs",
-    )
-    parser.add_argument(
-        "--led-diameter",
-        type=number_from(*LED_DIAMETERS, "diameter", "mm"),
-        default=DISC_DIAMETER,
-        metavar="MM",
-        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
-    )
-    parser.add_argument(
-        "--blur",
-        type=number_from(*BLURS, "blur", "px"),
-        default=0.8,
-        metavar="PX",
-        help="standard deviation of the optical blur",
-    )
-    parser.add_argument(
-        "--bits", type=int, choices=(8, 12, 16), default=8, help="bits per pixel (8)"
     )
     parser.add_argument(
         "--binning",
@@ -99,21 +66,11 @@ def _n_images(text: str) -> int:
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen_extensions.simulator.scene_files import write_rig_scene, write_scene
-    from lightpen_extensions.simulator.scenes import LEDS, Scene, Sensor, row_of_cameras
-    from lightpen_extensions.simulator.swings import paper_camera, paper_pen
+    from lightpen_extensions.simulator.scenes import Scene, row_of_cameras
+    from lightpen_extensions.simulator.swings import paper_camera
 
-    looks = LEDS[options.leds]
-
-    scene = Scene(
-        n_images=options.images,
-        seed=options.seed,
-        swing=options.swing,
-        sensor=Sensor(bits=options.bits),
-        faces=looks.faces,
-        optics=replace(looks.optics, psf_sigma=options.blur),
-        pen=replace(paper_pen(), diameter=options.led_diameter),
-        camera=paper_camera(options.binning),
-    )
+    camera = paper_camera(options.binning)
+    scene = Scene(n_images=options.images, seed=options.seed, camera=camera)
     with progress("Rendering") as report:
         if options.cameras == 1:
             x, y, z = write_scene(scene, options.out, report)

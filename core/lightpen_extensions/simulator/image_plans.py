@@ -12,8 +12,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rig_of
-from lightpen_extensions.simulator.faces import Dome, Face, HotSpot, Ring
-from lightpen_extensions.simulator.render import render_view
+from lightpen_extensions.simulator.render import Optics, View, render_view
 from lightpen_extensions.simulator.scenes import Scene, expose
 from lightpen_extensions.simulator.swings import (
     Swing,
@@ -22,18 +21,12 @@ from lightpen_extensions.simulator.swings import (
     shows_all,
     swing_poses,
 )
-from lightpen_extensions.simulator.view import Optics, View
 
 LED_DECIMALS = 5  # of a measuring machine's millimetres
 MIN_GAIN = 0.93  # of the dimmest LED against the brightest
-HOT_DISTANCE = (0.15, 0.45)  # of a hot spot from the middle, in radii
-HOT_WIDTH = (0.3, 0.5)
-HOT_SHARE = (0.3, 0.7)
-DOME_HEIGHT, DOME_DARKENING = 0.35, 0.75
-RING_INNER, RING_SOFTNESS, RING_MIDDLE = 0.55, 0.12, 0.15
 
 # Independent streams of a seed.
-SWING, _GEOMETRY, _GAINS, FRAME, _NOISE, _FACES = range(6)
+SWING, _GEOMETRY, _GAINS, FRAME, _NOISE = range(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +89,6 @@ def swing_of(
     return swing_poses(
         scene.n_images,
         rng,
-        scene.swing,
         pen=scene.pen,
         camera=scene.camera,
         tip_pen=scene.tip_pen,
@@ -110,9 +102,9 @@ def plan_swing(scene: Scene, swing: Swing) -> ScenePlan:
     measured = perturbed_pen(scene.pen, scene.led_noise, stream(scene, _GEOMETRY))
     leds = np.round(measured.leds, LED_DECIMALS)
     measured_pen = replace(measured, leds=leds, led_sigma=scene.led_noise or None)
-    gains, faces = led_gains(scene), led_faces(scene)
+    gains = led_gains(scene)
     image_plans = tuple(
-        ImagePlan(i, View(R[None], t[None], gains, faces=faces), scene.optics, R, t)
+        ImagePlan(i, View(R[None], t[None], gains), scene.optics, R, t)
         for i, (R, t) in enumerate(
             zip(swing.rotations, swing.translations, strict=True)
         )
@@ -130,26 +122,6 @@ def led_gains(scene: Scene) -> FloatArray:
     """Return the relative brightness of each LED of the scene's pen."""
     rng = stream(scene, _GAINS)
     return rng.uniform(MIN_GAIN, 1, scene.pen.n_leds)
-
-
-def led_faces(scene: Scene) -> tuple[Face, ...]:
-    """Return the luminance pattern of each LED; empty if all are uniform."""
-    rng = stream(scene, _FACES)
-    match scene.faces:
-        case "even":
-            return ()
-        case "hot-spot":
-            return tuple(_random_hot_spot(rng) for _ in scene.pen.leds)
-        case "dome":
-            return (Dome(DOME_HEIGHT, DOME_DARKENING),) * scene.pen.n_leds
-        case "ring":
-            return (Ring(RING_INNER, RING_SOFTNESS, RING_MIDDLE),) * scene.pen.n_leds
-
-
-def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
-    distance, direction = rng.uniform(*HOT_DISTANCE), rng.uniform(0, 2 * np.pi)
-    place = distance * np.cos(direction), distance * np.sin(direction)
-    return HotSpot(place, rng.uniform(*HOT_WIDTH), rng.uniform(*HOT_SHARE))
 
 
 def stream(scene: Scene, *path: int) -> np.random.Generator:

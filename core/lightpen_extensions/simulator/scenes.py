@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from statistics import NormalDist
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
@@ -11,16 +11,13 @@ from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rotation_from_vector
-from lightpen_extensions.simulator.faces import LightArray
-from lightpen_extensions.simulator.render import Light
+from lightpen_extensions.simulator.render import Light, LightArray, Optics
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
-    SwingKind,
     paper_camera,
     paper_pen,
 )
-from lightpen_extensions.simulator.view import Optics
 
 # The image sensor: shot noise, read noise, quantisation.
 #
@@ -36,7 +33,6 @@ from lightpen_extensions.simulator.view import Optics
 
 MOSTLY = 0.9  # share of the most likely reading above which the rest is drawn alone
 TABLE_SIZE = 2**16  # equally likely values: one for each 16-bit random number
-STRIP = 64  # rows
 
 
 @dataclass(frozen=True)
@@ -65,33 +61,11 @@ class Sensor:
 
 def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
     """Return the image (H, W) that a sensor reads, uint8 for 8 bits, else uint16."""
-    if light.gradient != (0.0, 0.0):
-        return _read_uneven(light, sensor, rng)
-    image = _dark_image(light.background, sensor, light.levels.size, rng)
+    image = _dark_image(sensor, light.levels.size, rng)
     image = image.reshape(light.levels.shape)
     for window in light.windows:
-        levels = light.levels[window.slices] + np.float32(light.background)
         # Where windows overlap the last reading stands, which is as good as the first.
-        image[window.slices] = _read(levels, sensor, rng)
-    return image
-
-
-def _background(light: Light) -> LightArray:
-    height, width = light.levels.shape
-    across, down = light.gradient
-    ramp = across * (np.arange(width) / width - 0.5)
-    slope = down * (np.arange(height) / height - 0.5)
-    background = light.background + ramp + slope[:, None]
-    return np.asarray(np.maximum(background, 0), dtype=np.float32)
-
-
-def _read_uneven(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
-    """Read all pixels one by one, in strips that fit the processor's cache."""
-    image = _blank(light.levels.shape, sensor)
-    levels = light.levels + _background(light)
-    for top in range(0, len(image), STRIP):
-        rows = slice(top, top + STRIP)
-        image[rows] = _read(levels[rows], sensor, rng)
+        image[window.slices] = _read(light.levels[window.slices], sensor, rng)
     return image
 
 
@@ -131,11 +105,9 @@ def _normal_table() -> LightArray:
     return np.asarray(values / values.std(), dtype=np.float32)
 
 
-def _dark_image(
-    background: float, sensor: Sensor, n_pixels: int, rng: np.random.Generator
-) -> Image:
-    """Return ``n_pixels`` independent readings of an even background."""
-    values, probabilities = _dark_distribution(background, sensor)
+def _dark_image(sensor: Sensor, n_pixels: int, rng: np.random.Generator) -> Image:
+    """Return ``n_pixels`` independent readings of darkness."""
+    values, probabilities = _dark_distribution(sensor)
     likely = int(np.argmax(probabilities))
     others = 1 - probabilities[likely]
     if probabilities[likely] < MOSTLY:
@@ -166,13 +138,10 @@ def _bernoulli_places(n: int, probability: float, rng: np.random.Generator) -> I
 
 
 @lru_cache(maxsize=32)
-def _dark_distribution(
-    background: float, sensor: Sensor
-) -> tuple[IntArray, FloatArray]:
-    """Return the readings that occur and their probabilities."""
-    charge = background * sensor.full_well
-    mean = (charge + sensor.offset) / sensor.electrons_per_dn
-    sigma = np.sqrt(charge + sensor.read_noise**2) / sensor.electrons_per_dn
+def _dark_distribution(sensor: Sensor) -> tuple[IntArray, FloatArray]:
+    """Return the readings that occur in the dark and their probabilities."""
+    mean = sensor.offset / sensor.electrons_per_dn
+    sigma = sensor.read_noise / sensor.electrons_per_dn
     low = max(int(np.floor(mean - 7 * sigma)), 0)
     high = min(int(np.ceil(mean + 7 * sigma)), sensor.full_scale)
     values = np.arange(low, max(high, low) + 1)
@@ -182,39 +151,14 @@ def _dark_distribution(
     return values, np.diff(upper, prepend=0.0)
 
 
-FaceKind: TypeAlias = Literal["even", "hot-spot", "dome", "ring"]
-
-
-@dataclass(frozen=True)
-class Leds:
-    """Luminance pattern of LEDs, and scattering of the optics."""
-
-    faces: FaceKind = "even"
-    optics: Optics = field(default_factory=Optics)
-
-
-LEDS = {
-    "even": Leds(),
-    "hot-spot": Leds("hot-spot"),
-    "dome": Leds("dome"),
-    "ring": Leds("ring"),
-    "halo": Leds(optics=Optics(halo=0.15)),
-    "ghost": Leds(optics=Optics(ghost=0.03)),
-    "board": Leds("dome", Optics(halo=0.1, board=0.1)),
-}
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Content of a simulated set of images."""
 
     n_images: int = 60
     seed: int = 1
-    swing: SwingKind = "field"  # see `postures.draw_postures`
     optics: Optics = field(default_factory=Optics)
     sensor: Sensor = field(default_factory=Sensor)
-    # Even, an off-centre spot, a dome whose bright part moves, or a dark centre.
-    faces: FaceKind = "even"
     led_noise: float = 0.002  # mm, of the measured LED coordinates about the truth
     pen: Pen = field(default_factory=paper_pen)  # the truth
     camera: Camera = field(default_factory=paper_camera)

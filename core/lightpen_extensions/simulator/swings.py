@@ -1,4 +1,4 @@
-"""Simulated pens, swings and LED centres, with their truth.
+"""Simulated pens and swings, with their truth.
 
 Everything random comes from the generator the caller hands in, so that a seed gives the
 same data every time.
@@ -7,13 +7,12 @@ same data every time.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.camera import Camera
-from lightpen.model.ellipse import disc_images, ellipse_centers
+from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import FACING, moved_from
 
@@ -29,14 +28,8 @@ from lightpen.model.rigid import FACING, moved_from
 # coordinates.
 
 
-SwingKind: TypeAlias = Literal["field", "cone", "operator", "one-axis", "upright"]
-SWING_KINDS: tuple[SwingKind, ...] = get_args(SwingKind)
-
 MAX_TILT = np.radians(33)
 MAX_ROLL = np.radians(32)
-CONE_TILT = np.radians(28)
-UPRIGHT_TILT = np.radians(1.5)  # far too little to fix the tip
-FRAME_RATE = 20.0  # images per second of the operator's swing
 TREMOR = np.radians(0.1)
 TREMOR_BAND = (7.0, 12.0)  # Hz, of a human hand
 
@@ -65,38 +58,6 @@ def random_postures(n: int, rng: np.random.Generator) -> Postures:
         rng.uniform(0, 2 * np.pi, n),
         rng.uniform(-MAX_ROLL, MAX_ROLL, n),
     )
-
-
-def draw_postures(n: int, rng: np.random.Generator, kind: SwingKind) -> Postures:
-    """Return ``n`` postures of a kind of swing.
-
-    ``field``: random all round. ``cone``: constant tilt that goes round once, with
-    roll. ``operator``: a hand's smooth movement at `FRAME_RATE`. ``one-axis`` and
-    ``upright`` (hardly tilted) do not fix the tip.
-    """
-    steps = (np.arange(n) + 0.5) / max(n, 1)
-    start = rng.uniform(0, 2 * np.pi)
-    zero = np.zeros(n)
-    match kind:
-        case "field":
-            return random_postures(n, rng)
-        case "cone":
-            # The golden ratio keeps roll and direction from repeating together.
-            rolls = MAX_ROLL * (2 * np.mod(np.arange(n) * 0.618034, 1) - 1)
-            return Postures(zero + CONE_TILT, start + 2 * np.pi * steps, rolls)
-        case "operator":
-            seed = int(rng.integers(2**31))
-            return operator_postures(np.arange(n) / FRAME_RATE, seed)
-        case "one-axis":
-            return Postures(MAX_TILT * (2 * steps - 1), zero + start, zero)
-        case "upright":
-            drawn = random_postures(n, rng)
-            shrink = UPRIGHT_TILT / MAX_TILT
-            return Postures(
-                drawn.tilts * shrink, drawn.directions, drawn.rolls * shrink
-            )
-        case _:
-            raise ValueError(f"`kind` must be one of {SWING_KINDS}, got {kind!r}.")
 
 
 def operator_postures(times: FloatArray, seed: int = 0) -> Postures:
@@ -219,7 +180,6 @@ def perturbed_pen(pen: Pen, sigma: float, rng: np.random.Generator) -> Pen:
 def swing_poses(
     n_frames: int,
     rng: np.random.Generator,
-    kind: SwingKind = "field",
     *,
     pen: Pen | None = None,
     camera: Camera | None = None,
@@ -229,13 +189,11 @@ def swing_poses(
 ) -> Swing:
     """Return a swing with the tip in the cone.
 
-    In a ``field`` or a ``cone`` every LED is whole in the image and clear of the rest,
-    as a careful operator holds the pen.
+    The postures are random all round; every LED is whole in the image and clear of the
+    rest, as a careful operator holds the pen.
 
     Parameters
     ----------
-    kind : str
-        See `lightpen_extensions.simulator.swings.draw_postures`.
     pen, camera : optional
         The paper's unless given.
     tip_pen, cone_cam : (3,) array
@@ -247,15 +205,10 @@ def swing_poses(
     pen = pen or paper_pen()
     camera = camera or paper_camera()
     shows = shows or partial(shows_all, camera, pen)
-
-    def draw(n: int) -> Swing:
-        return swing_from_postures(draw_postures(n, rng, kind), tip_pen, cone_cam)
-
-    if kind not in {"field", "cone"}:
-        return draw(n_frames)
     n_drawn = n_frames
     for _ in range(MAX_DOUBLINGS):
-        swing = draw(n_drawn)
+        rng.random()  # so that published figures keep their swings
+        swing = swing_from_postures(random_postures(n_drawn, rng), tip_pen, cone_cam)
         good = np.flatnonzero(shows(swing))
         if len(good) >= n_frames:
             spread = good[np.arange(n_frames) * len(good) // max(n_frames, 1)]
@@ -311,27 +264,6 @@ def seen_from(swing: Swing, R: FloatArray, t: FloatArray) -> Swing:
     )
 
 
-def simulate_centers(
-    camera: Camera,
-    pen: Pen,
-    rotations: FloatArray,
-    translations: FloatArray,
-    sigma: float,
-    rng: np.random.Generator,
-) -> FloatArray:
-    """Return measured centres (F, L, 2) of the LEDs, px, without rendering an image.
-
-    The exact centre of each disc's elliptic image plus independent Gaussian noise,
-    sigma px per coordinate. LEDs that face away or lie outside the image are NaN. The
-    poses cam_from_pen are rotations (F, 3, 3) and translations (F, 3), mm.
-    """
-    leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
-    centers = ellipse_centers(camera, leds_cam, normals_cam, pen.diameter / 2)
-    seen = faces_camera(leds_cam, normals_cam) & _inside(camera, centers)
-    noise = sigma * rng.standard_normal(centers.shape)
-    return np.where(seen[..., None], centers + noise, np.nan)
-
-
 def leds_in_camera(
     pen: Pen, rotations: FloatArray, translations: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -352,7 +284,8 @@ def edge_gaps(
     """Return a lower bound (F,) of the narrowest gap between two discs, px.
 
     Each disc reaches as far as its semi-major axis in every direction; discs may
-    overlap where it is negative. For the arguments see `simulate_centers`.
+    overlap where it is negative. The poses cam_from_pen are rotations (F, 3, 3) and
+    translations (F, 3), mm.
     """
     leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
     centers, shapes = disc_images(camera, leds_cam, normals_cam, pen.diameter / 2)
@@ -369,13 +302,16 @@ def shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
     leds_cam, normals_cam = leds_in_camera(pen, swing.rotations, swing.translations)
     facing = faces_camera(leds_cam, normals_cam).all(axis=-1)
     radius = camera.fx * pen.diameter / 2 / leds_cam[..., 2].min()
-    inside = _inside(camera, camera.project(leds_cam), margin=2 * radius).all(axis=-1)
+    inside = inside_image(camera, camera.project(leds_cam), margin=2 * radius).all(
+        axis=-1
+    )
     clear = edge_gaps(camera, pen, swing.rotations, swing.translations) >= MIN_GAP
     shows: BoolArray = facing & inside & clear
     return shows
 
 
-def _inside(camera: Camera, pixels: FloatArray, margin: float = 0.0) -> BoolArray:
+def inside_image(camera: Camera, pixels: FloatArray, margin: float = 0.0) -> BoolArray:
+    """Return the mask of pixels (..., 2) in the image, farther than a margin, px."""
     size = np.array(camera.image_size)
     inside: BoolArray = np.all(
         (pixels >= margin - 0.5) & (pixels <= size - 0.5 - margin), axis=-1

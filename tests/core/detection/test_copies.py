@@ -1,18 +1,13 @@
 """Images that are copies of others count once."""
 
 import numpy as np
-from tests.simulated_centers import calibrate_pixels, observe_pixels
+from tests.simulated_centers import calibrate_pixels, observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import without_copies
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.report_warnings import warnings_of
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -9,9 +9,9 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.model.ellipse import disc_images
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.render import Optics
 from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import leds_in_camera, paper_camera
-from lightpen_extensions.simulator.view import Optics
 
 N_IMAGES = 8
 USUAL, DIM = 1.0, 0.08  # exposures; of the dim one 8 bits resolve some ten steps

@@ -7,16 +7,16 @@ import cv2
 import numpy as np
 import pytest
 from tests.simulated_disturbances import Finger
+from tests.simulated_leds import Dome, Face, RealLeds, Ring, with_leds
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import EdgeFits, EdgeStarts, fit_edges
 from lightpen.detection.labelling.constellation import UNWHOLE
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.model.ellipse import Ellipses, disc_images
-from lightpen_extensions.simulator.faces import Dome, Ring
 from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene
-from lightpen_extensions.simulator.render import render_view
-from lightpen_extensions.simulator.scenes import LEDS, Scene, expose
+from lightpen_extensions.simulator.render import Optics, render_view
+from lightpen_extensions.simulator.scenes import Scene, expose
 from lightpen_extensions.simulator.swings import leds_in_camera
 
 N_IMAGES = 3
@@ -32,13 +32,9 @@ class DisplayedImage:
 
 
 def scene(leds: str, diameter: float = 10.0, blur: float = 0.8) -> Scene:
-    looks = LEDS[leds]
-    usual = Scene(n_images=N_IMAGES, seed=4, faces=looks.faces)
-    return replace(
-        usual,
-        optics=replace(looks.optics, psf_sigma=blur),
-        pen=replace(usual.pen, diameter=diameter),
-    )
+    usual = Scene(n_images=N_IMAGES, seed=4, optics=Optics(psf_sigma=blur))
+    pen = replace(usual.pen, diameter=diameter)
+    return with_leds(replace(usual, pen=pen), leds)
 
 
 def show(scene: Scene, plan: ImagePlan, *fingers: Finger) -> DisplayedImage:
@@ -48,6 +44,10 @@ def show(scene: Scene, plan: ImagePlan, *fingers: Finger) -> DisplayedImage:
     leds, normals = leds_in_camera(scene.pen, plan.rotation, plan.translation)
     radius = scene.pen.diameter / 2
     return DisplayedImage(image, disc_images(scene.camera, leds, normals, radius))
+
+
+def with_faces(plan: ImagePlan, faces: tuple[Face, ...]) -> ImagePlan:
+    return replace(plan, optics=replace(plan.optics, draw_leds=RealLeds(faces)))
 
 
 @lru_cache(maxsize=8)
@@ -149,7 +149,7 @@ def test_a_narrow_ring_about_a_black_middle_is_whole() -> None:
     wanted = scene("ring")
     plan = plan_scene(wanted).image_plans[0]
     rings = (Ring(inner=0.75, softness=0.05, middle=0.0),) * wanted.pen.n_leds
-    one = show(wanted, replace(plan, view=replace(plan.view, faces=rings)))
+    one = show(wanted, with_faces(plan, rings))
     spots = detect_spots(one.image)
     assert not (spots.flaws & UNWHOLE).any()
     errors = [spots.centers[nearest(spots, c)] - c for c in one.discs.centers]
@@ -160,7 +160,7 @@ def test_a_dome_without_light_at_its_rim_is_not_blurred_and_has_its_center() -> 
     wanted = scene("dome")
     for plan in plan_scene(wanted).image_plans:
         domes = (Dome(height=1.0, darkening=1.0),) * wanted.pen.n_leds
-        one = show(wanted, replace(plan, view=replace(plan.view, faces=domes)))
+        one = show(wanted, with_faces(plan, domes))
         spots = detect_spots(one.image)
         assert not (spots.flaws & (UNWHOLE | SpotFlaw.BLURRED)).any()
         errors = [spots.centers[nearest(spots, c)] - c for c in one.discs.centers]

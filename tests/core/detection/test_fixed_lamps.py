@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from tests.simulated_lights import Lamp
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.fixed_lamps import fixed_lamps, lamps_among, masked_lights
@@ -13,7 +14,6 @@ from lightpen.model.camera import Camera
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_pen
-from lightpen_extensions.simulator.view import Lamp
 
 SMALL = Camera(320, 240, 600.0, 600.0, 160.0, 120.0)
 PEN = paper_pen()
@@ -102,7 +102,7 @@ def test_the_leds_of_the_pen_are_no_lamps() -> None:
     scene = Scene(n_images=1, seed=4)
     plan = plan_scene(scene).image_plans[0]
     lamp = Lamp(np.array([240.0, 240.0]), (10.0, 10.0), level=0.6)
-    image = render_plan(scene, replace(plan, view=replace(plan.view, lamps=(lamp,))))
+    image = render_plan(scene, replace(plan, view=replace(plan.view, others=(lamp,))))
     spots = detect_spots(image)
     labels: list[Labels] = label_images([spots], scene.camera, scene.pen)
     detection = detections_of([spots], labels, scene.camera)[0]

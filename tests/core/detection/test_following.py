@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_leds import with_leds
 from tests.simulated_plans import live_plan
 
 from lightpen.detection.pen_detection import PenDetection, detect_pen, follow_spots
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen_extensions.simulator.image_plans import render_plan
-from lightpen_extensions.simulator.scenes import LEDS, Scene
+from lightpen_extensions.simulator.scenes import Scene
 
 SCENE = Scene()
 
@@ -87,7 +88,7 @@ def test_a_cut_spot_on_its_led_is_labelled_but_not_used() -> None:
 
 @pytest.mark.parametrize("look", ["hot-spot", "dome"])
 def test_rims_found_from_the_image_before_are_those_found_anew(look: str) -> None:
-    scene = replace(SCENE, faces=LEDS[look].faces)
+    scene = with_leds(SCENE, look)
     first, second = (render_plan(scene, live_plan(scene, 0, t)) for t in (1.0, 1.05))
     before = detect_spots(first)
     anew, known = detect_spots(second), detect_spots(second, before=before)
@@ -103,7 +104,7 @@ def test_rims_found_from_the_image_before_are_those_found_anew(look: str) -> Non
 def test_rims_beside_a_shining_board_are_found_from_the_image_before(
     look: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = replace(SCENE, faces=LEDS[look].faces, optics=LEDS[look].optics)
+    scene = with_leds(SCENE, look)
     first, second = (render_plan(scene, live_plan(scene, 0, t)) for t in (1.0, 1.05))
     before, anew = detect_spots(first), detect_spots(second)
     monkeypatch.delattr("lightpen.detection.edge_fit._onto_steepest")

@@ -22,9 +22,9 @@ from lightpen.detection.inspection import (
 from lightpen.detection.labelling.labels import label_spots
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.render import Optics
 from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
-from lightpen_extensions.simulator.view import Optics
 
 NOTHING = detect_spots(np.zeros((512, 512), dtype=np.uint8))
 

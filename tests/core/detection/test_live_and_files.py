@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from tests.simulated_disturbances import HARD, Finger, Glare, plan_disturbed
+from tests.simulated_lights import Backlight, Defocus, Lamp
 from tests.simulated_pens import six_led_pen
 from tests.simulated_plans import live_plan
 
@@ -28,9 +29,9 @@ from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
+from lightpen_extensions.simulator.render import OtherLight
 from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import flat_pen, leds_in_camera
-from lightpen_extensions.simulator.view import Lamp
 
 SCENE = Scene()
 CAMERA, PEN = SCENE.camera, SCENE.pen
@@ -48,8 +49,12 @@ def shown(shot: ImagePlan = SHOT, scene: Scene = SCENE) -> Image:
     return render_plan(scene, shot)
 
 
+def with_others(shot: ImagePlan, *others: OtherLight) -> ImagePlan:
+    return replace(shot, view=replace(shot.view, others=others))
+
+
 def blurred(radius: float, shot: ImagePlan = SHOT) -> Image:
-    return shown(replace(shot, optics=replace(shot.optics, defocus_radius=radius)))
+    return shown(with_others(shot, *shot.view.others, Defocus(radius)))
 
 
 def exposed(times: float) -> Image:
@@ -58,8 +63,7 @@ def exposed(times: float) -> Image:
 
 def backlit(background: float, shot: ImagePlan = SHOT) -> Image:
     gradient = (0.4 * background, 0.2 * background)
-    optics = replace(shot.optics, background=background, gradient=gradient)
-    return shown(replace(shot, optics=optics))
+    return shown(with_others(shot, Backlight(background, gradient)))
 
 
 def tiny(diameter: float) -> Image:
@@ -87,15 +91,13 @@ def merged(n_leds: int) -> ImagePlan:
 
 def covered(start: FloatArray, radius: float) -> ImagePlan:
     """Return the pen with a finger before it, from there to the right."""
-    finger = Finger(start, start + AWAY, radius)
-    return replace(SHOT, view=replace(SHOT.view, others=(finger,)))
+    return with_others(SHOT, Finger(start, start + AWAY, radius))
 
 
 def lamplit(
     *places: FloatArray, radius: float = RADIUS, shot: ImagePlan = SHOT
 ) -> ImagePlan:
-    lamps = tuple(Lamp(place, (radius, radius)) for place in places)
-    return replace(shot, view=replace(shot.view, lamps=lamps))
+    return with_others(shot, *(Lamp(place, (radius, radius)) for place in places))
 
 
 def moved(right: float) -> ImagePlan:
@@ -106,9 +108,9 @@ def moved(right: float) -> ImagePlan:
 
 
 def of_pen(pen: Pen, defocus: float = 0.0) -> Image:
-    optics = replace(SCENE.optics, defocus_radius=defocus)
-    scene = replace(SCENE, pen=pen, optics=optics)
-    return shown(live_plan(scene, 0, 1.0), scene)
+    scene = replace(SCENE, pen=pen)
+    shot = live_plan(scene, 0, 1.0)
+    return shown(with_others(shot, Defocus(defocus)) if defocus else shot, scene)
 
 
 def of_depth(sensor: Sensor) -> Image:
@@ -126,7 +128,7 @@ def strewn_lamps() -> list[FloatArray]:
 
 def window() -> ImagePlan:
     corners = np.array([[100.0, 100], [400, 150], [380, 900], [90, 800]])
-    return replace(SHOT, view=replace(SHOT.view, others=(Glare(corners, 1.2),)))
+    return with_others(SHOT, Glare(corners, 1.2))
 
 
 FEW = (0, 2, 4, 6)

@@ -2,7 +2,12 @@
 
 import numpy as np
 import pytest
-from tests.simulated_centers import displace_centers, drop_centers, swap_centers
+from tests.simulated_centers import (
+    displace_centers,
+    drop_centers,
+    simulate_centers,
+    swap_centers,
+)
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_paper_poses, fit_poses, start_poses
@@ -14,7 +19,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     select_frames,
-    simulate_centers,
     swing_poses,
 )
 

@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.pose import fit_pose, fit_poses
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 ALIKE = np.full(PEN.n_leds, 0.01)

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 from tests.simulated_disturbances import slip_tip
+from tests.simulated_swings import SwingKind, swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -14,14 +16,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.swings import (
-    Swing,
-    SwingKind,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import Swing, paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()
@@ -39,7 +34,7 @@ def calibration(pixels: FloatArray, pen: Pen = PEN) -> Calibration:
 
 
 def swing(n_frames: int = 60, kind: SwingKind = "field", seed: int = 0) -> Swing:
-    return swing_poses(n_frames, np.random.default_rng(seed), kind)
+    return swing_of_kind(n_frames, np.random.default_rng(seed), kind)
 
 
 def test_exact_centres_give_the_exact_tip_by_the_joint_fit() -> None:

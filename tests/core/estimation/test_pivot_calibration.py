@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.simulated_centers import correlated_noise
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
@@ -19,7 +20,7 @@ N_POSES = 200
 def poses(correlation: float = 0.0, seed: int = 0) -> tuple[FloatArray, FloatArray]:
     """Return poses of an operator's swing with noise of 0.3 mm."""
     rng = np.random.default_rng(seed)
-    swing = swing_poses(N_POSES, rng, "operator")
+    swing = swing_of_kind(N_POSES, rng, "operator")
     noise = 0.3 * correlated_noise(N_POSES, correlation, rng)
     return swing.rotations, swing.translations + noise
 

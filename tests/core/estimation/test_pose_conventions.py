@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -12,7 +13,7 @@ from lightpen.estimation.pivot_calibration import (
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.swings import swing_poses
 
-SWING = swing_poses(60, np.random.default_rng(0), "operator")
+SWING = swing_of_kind(60, np.random.default_rng(0), "operator")
 R = SWING.rotations
 T = SWING.translations + 0.2 * np.random.default_rng(1).standard_normal((60, 3))
 

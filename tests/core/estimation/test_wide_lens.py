@@ -1,17 +1,13 @@
 """Tests of a tip before a fisheye."""
 
 import numpy as np
-from tests.simulated_centers import observe_pixels
+from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.estimation.calibrate import calibrate
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.limits import Assumptions
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.swings import (
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 FISHEYE = Camera(
     *(2448, 2048, 1300.0, 1299.0, 1219.6, 1031.3),

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
@@ -12,12 +13,7 @@ from lightpen.model.rigid import rig_of
 from lightpen.swing.capture.kept_images import keep, none_kept
 from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.status import FailedSwing, failed_swing
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 WHY = message("joint.not-settled", n_steps=100)

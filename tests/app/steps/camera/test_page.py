@@ -26,6 +26,7 @@ from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
 from tests.app.undressed import undressed
 from tests.faulty_camera import FaultyCamera
+from tests.simulated_lights import Lamp
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.cameras.protocol import CameraSettings, Connection, Frame, sealed
@@ -54,7 +55,6 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.hand import HandActivity, SimulatedOperator
 from lightpen_extensions.simulator.scene_files import write_scene
 from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.view import Lamp
 
 if TYPE_CHECKING:
     from tests.app.steps.conftest import See, Seen
@@ -110,7 +110,7 @@ def live(seen: "Seen") -> "Seen":
 def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> FaultyCamera:
     """Open a simulated camera in which things can go wrong."""
     clock = workbench.around.clock
-    camera = FaultyCamera(scene, clock, lamps=lamps)
+    camera = FaultyCamera(scene, clock, others=lamps)
     workbench.live.open([camera], CameraSettings(), clock)
     return camera
 

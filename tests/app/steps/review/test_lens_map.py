@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from pytestqt.qtbot import QtBot
-from tests.simulated_centers import observe_pixels
+from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import calibrate
@@ -13,12 +13,7 @@ from lightpen.model.rigid import rig_of
 from lightpen.record.swings.solving import RecordSource, Solution
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.widgets.result_plots import ArrowPlot
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 N_IMAGES = 32
 

@@ -29,6 +29,7 @@ from tests.app.blank_page import BlankPage
 from tests.app.room import scrolled_sideways
 from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
+from tests.simulated_centers import simulate_centers
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.sources import SourceEnvironment
@@ -55,7 +56,7 @@ from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 Key = Qt.Key
 LEFT = Qt.MouseButton.LeftButton

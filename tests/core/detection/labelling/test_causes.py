@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import cause_of_misfit
@@ -13,12 +13,7 @@ from lightpen.estimation.reports.verdict import judge
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 LAST = np.array(CAMERA.image_size) - 1.0

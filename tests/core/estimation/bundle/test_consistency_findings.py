@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels, observe_pixels
+from tests.simulated_centers import calibrate_pixels, observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.consistency_findings import (
@@ -24,7 +24,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

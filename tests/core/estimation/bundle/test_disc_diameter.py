@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import observe_pixels
+from tests.simulated_centers import observe_pixels, simulate_centers
 from tests.simulated_pens import fanned_pen
 
 from lightpen.arrays import FloatArray
@@ -23,7 +23,6 @@ from lightpen_extensions.simulator.swings import (
     leds_in_camera,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

@@ -4,7 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels, simulate_rig_centers
+from tests.simulated_centers import (
+    calibrate_pixels,
+    simulate_centers,
+    simulate_rig_centers,
+)
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import FoundField, adjust, found_fields
@@ -22,7 +26,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     seen_from,
-    simulate_centers,
     swing_poses,
 )
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
@@ -16,12 +16,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.formats.opened_files import InputFile, Inputs
 from lightpen.model.limits import SwingLimits
 from lightpen.record.calibrations import shown_images
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 EVEN = np.ones((1, 10))

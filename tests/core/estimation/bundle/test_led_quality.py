@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels, drop_centers
+from tests.simulated_centers import calibrate_pixels, drop_centers, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.led_quality import LedQuality, measure_leds
@@ -16,7 +16,6 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
     perturbed_pen,
     select_frames,
-    simulate_centers,
     swing_poses,
 )
 

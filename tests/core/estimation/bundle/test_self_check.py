@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
@@ -23,7 +23,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     seen_from,
-    simulate_centers,
     swing_poses,
 )
 

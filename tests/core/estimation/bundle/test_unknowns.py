@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.image_fields import tilt_modes
@@ -19,7 +19,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
-    simulate_centers,
     swing_poses,
 )
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import observe_pixels
+from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.fixed_lamps import lamps_among
@@ -23,12 +23,7 @@ from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 N_IMAGES = 80

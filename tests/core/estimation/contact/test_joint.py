@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.simulated_centers import displace_centers, drop_centers
+from tests.simulated_centers import displace_centers, drop_centers, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -19,7 +19,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     select_frames,
-    simulate_centers,
     swing_poses,
 )
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import observe_pixels
+from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
@@ -18,12 +18,7 @@ from lightpen.estimation.contact.single_images import (
     require_images,
 )
 from lightpen.messages import Message, message
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), paper_pen()
 SWING = swing_poses(24, np.random.default_rng(1))

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from tests.simulated_centers import correlated_noise
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.pivot.pivot import contact_matrix
 from lightpen.estimation.pivot_calibration import correlated_covariance
 from lightpen_extensions.simulator.swings import swing_poses
 
-SWING = swing_poses(150, np.random.default_rng(0), "operator")
+SWING = swing_of_kind(150, np.random.default_rng(0), "operator")
 DESIGN = contact_matrix(SWING.rotations)
 INVERSE = np.linalg.inv(np.einsum("nki,nkj->ij", DESIGN, DESIGN))
 N_DRAWS = 80

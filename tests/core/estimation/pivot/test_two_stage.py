@@ -2,23 +2,18 @@
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
+from tests.simulated_swings import SwingKind, swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_paper_poses
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import fit_pivot, fit_two_stage, projection_bias
-from lightpen_extensions.simulator.swings import (
-    Swing,
-    SwingKind,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import Swing, paper_camera, paper_pen
 
 
 def swing(n_frames: int = 100, kind: SwingKind = "field", seed: int = 0) -> Swing:
-    return swing_poses(n_frames, np.random.default_rng(seed), kind)
+    return swing_of_kind(n_frames, np.random.default_rng(seed), kind)
 
 
 def test_exact_poses_give_the_exact_tip() -> None:

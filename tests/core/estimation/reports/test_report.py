@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.small_records import record_of
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
@@ -36,7 +36,6 @@ from lightpen_extensions.simulator.swings import (
     Postures,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_from_postures,
     swing_poses,
 )

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels, observe_pixels
+from tests.simulated_centers import calibrate_pixels, observe_pixels, simulate_centers
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.reasons import Reason
@@ -39,7 +39,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_from_postures,
     swing_poses,
 )

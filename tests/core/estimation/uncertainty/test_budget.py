@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_calibrations import CAMERA, PEN, lasting, observed
+from tests.simulated_centers import simulate_centers
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
@@ -24,7 +26,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rig_of
-from lightpen_extensions.simulator.swings import Swing, simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import Swing, swing_poses
 
 SWING = swing_poses(100, np.random.default_rng(0))
 FEW = swing_poses(40, np.random.default_rng(0))
@@ -121,7 +123,7 @@ def test_independent_noise_is_hardly_ever_raised() -> None:
 # The scatter is 11 times the independent one. 10 draws fix a variance to 45 %.
 @pytest.mark.slow
 def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has() -> None:
-    swing = swing_poses(60, np.random.default_rng(0), "operator")
+    swing = swing_of_kind(60, np.random.default_rng(0), "operator")
     errors, independent, raised = [], [], []
     for seed in range(10):
         result = calibrated(0.05 * lasting(seed, 0.9, 60), swing)

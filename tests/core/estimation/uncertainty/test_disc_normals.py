@@ -2,6 +2,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -11,12 +12,7 @@ from lightpen.estimation.uncertainty.disc_normals import (
     turned_normals,
 )
 from lightpen.formats.observation_files import Centers
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA, PEN = paper_camera(), replace(paper_pen(), led_sigma=0.002)
 TURN = np.array([0.03, -0.02])  # rad

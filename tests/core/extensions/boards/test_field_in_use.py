@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.simulated_boards import simulate_board_poses
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -17,12 +18,7 @@ from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import Views
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 N_VIEWS, N_IMAGES, NOISE = 24, 100, 0.03  # px
 AMPLITUDE, LENGTH = 0.06, 0.25  # px; of the width

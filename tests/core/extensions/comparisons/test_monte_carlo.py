@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from tests.simulated_centers import calibrate_pixels
+from tests.simulated_centers import calibrate_pixels, simulate_centers
 
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import DiameterReading
@@ -19,12 +19,7 @@ from lightpen_extensions.comparisons.monte_carlo import (
     run_trial,
     trials_of,
 )
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 S = TypeVar("S")
 T = TypeVar("T")

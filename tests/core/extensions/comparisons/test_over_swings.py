@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from msgspec import structs
+from tests.simulated_centers import simulate_centers
 from tests.simulated_sessions import recorded
 
 from lightpen.detection.observations import observe_centers
@@ -25,7 +26,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
-    simulate_centers,
     swing_poses,
 )
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.station import GOOD, _drawn_pen, drawn_rig
 from msgspec.structs import replace as replace_struct
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
@@ -17,12 +18,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.bending import ASSUMED, bending_on
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.comparisons.press_test import press_test
-from lightpen_extensions.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 N_IMAGES, NOISE, SEAT = 60, 0.03, 0.002  # px, mm
 DAY = date(2025, 11, 3)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
 from lightpen.arrays import FloatArray, IntArray
@@ -20,12 +21,7 @@ from lightpen_extensions.discover.labelling import (
 )
 from lightpen_extensions.discover.starts import Start, ideal_camera
 from lightpen_extensions.discover.tracks import Pieces
-from lightpen_extensions.simulator.swings import (
-    Postures,
-    Swing,
-    simulate_centers,
-    swing_from_postures,
-)
+from lightpen_extensions.simulator.swings import Postures, Swing, swing_from_postures
 
 STATION = random_station(31000)
 

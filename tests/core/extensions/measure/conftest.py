@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.accepted_tip import accept_tip
+from tests.simulated_centers import simulate_centers
 from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
@@ -20,12 +21,7 @@ from lightpen_extensions.measure.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
-from lightpen_extensions.simulator.swings import (
-    PAPER_TIP,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-)
+from lightpen_extensions.simulator.swings import PAPER_TIP, paper_camera, paper_pen
 
 SIGMA = 0.01  # px
 TIP_SIGMA = 0.001  # mm

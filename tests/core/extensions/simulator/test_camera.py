@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
+from tests.simulated_lights import Lamp
 
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.observations import Observations, observe_images
@@ -12,7 +13,6 @@ from lightpen_extensions.simulator.camera import SimulatedCamera, SkippingClock
 from lightpen_extensions.simulator.hand import SimulatedOperator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
-from lightpen_extensions.simulator.view import Lamp
 
 SMALL = Camera(width=612, height=512, fx=1160, fy=1160, cx=305, cy=258)
 SCENE = Scene(camera=SMALL)
@@ -27,11 +27,11 @@ class LateClock(SkippingClock):
 def seated_camera(
     scene: Scene = SCENE,
     clock: SkippingClock | None = None,
-    lamps: tuple[Lamp, ...] = (),
+    others: tuple[Lamp, ...] = (),
 ) -> FaultyCamera:
     clock = clock or SkippingClock()
     operator = SimulatedOperator(clock, scene.seed, seated=True)
-    camera = FaultyCamera(scene, clock, operator, lamps=lamps)
+    camera = FaultyCamera(scene, clock, operator, others=others)
     camera.open()
     return camera
 
@@ -39,9 +39,9 @@ def seated_camera(
 def streaming_camera(
     scene: Scene = SCENE,
     clock: SkippingClock | None = None,
-    lamps: tuple[Lamp, ...] = (),
+    others: tuple[Lamp, ...] = (),
 ) -> FaultyCamera:
-    camera = seated_camera(scene, clock, lamps)
+    camera = seated_camera(scene, clock, others)
     camera.start()
     return camera
 
@@ -184,7 +184,7 @@ def test_twelve_bits_come_in_sixteen() -> None:
 
 def test_covered_leds_are_dark_and_foreign_lights_stay() -> None:
     lamp = Lamp(np.array([80.0, 60.0]), (6.0, 5.0))
-    camera = streaming_camera(lamps=(lamp,))
+    camera = streaming_camera(others=(lamp,))
     (before,) = read(camera, 1)
     camera.operator.cover()
     after = read(camera, 2)[-1]

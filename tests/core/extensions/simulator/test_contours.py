@@ -2,15 +2,15 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from tests.simulated_lights import ellipse_contour
 from tests.simulated_outlines import measure_insides
 
 from lightpen.arrays import FloatArray
-from lightpen_extensions.simulator.faces import (
+from lightpen_extensions.simulator.render import (
     Contours,
     Patch,
     blurred_insides,
     disc_contours,
-    ellipse_contour,
 )
 from lightpen_extensions.simulator.swings import (
     Postures,
@@ -125,12 +125,3 @@ def test_moving_disc_is_the_mean_of_its_places() -> None:
         height, width = still.levels.shape
         mean[top : top + height, left : left + width] += still.levels / 5
     np.testing.assert_allclose(blurred.levels, mean, atol=ROUNDED_NODES)
-
-
-def test_margin_adds_dark_pixels_only() -> None:
-    contours = pen_contours()
-    [tight, *_] = blurred_insides(contours, 0.8)
-    [wide, *_] = blurred_insides(contours, 0.8, margin=4)
-    assert wide.levels.shape == (tight.levels.shape[0] + 8, tight.levels.shape[1] + 8)
-    np.testing.assert_allclose(wide.levels[4:-4, 4:-4], tight.levels, atol=1e-5)
-    assert np.abs(wide.levels[:4]).max() < 1e-5

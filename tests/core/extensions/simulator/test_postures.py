@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
+from tests.simulated_swings import draw_postures
 
 from lightpen_extensions.simulator.swings import (
-    FRAME_RATE,
     MAX_TILT,
     Postures,
-    draw_postures,
     operator_postures,
     random_postures,
 )
@@ -55,7 +54,6 @@ def test_operator_moves_smoothly() -> None:
     # A hand turns the pen at less than 100 degrees per second.
     assert step.max() < np.radians(100) * 1e-3
     assert operator_postures(times, seed=2).tilts.max() < np.radians(33)
-    assert FRAME_RATE == 20
 
 
 def test_one_axis_swing_turns_about_one_axis_only() -> None:

@@ -6,13 +6,21 @@ import cv2
 import numpy as np
 import pytest
 from tests.simulated_disturbances import Finger, Glare, hidden_fraction, moving_poses
+from tests.simulated_lights import Backlight, Defocus, Lamp
 from tests.simulated_outlines import measure_insides
 from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.faces import disc_contours
-from lightpen_extensions.simulator.render import Light, led_levels, render_view
+from lightpen_extensions.simulator.render import (
+    Light,
+    Optics,
+    View,
+    Window,
+    disc_contours,
+    led_levels,
+    render_view,
+)
 from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
@@ -21,7 +29,6 @@ from lightpen_extensions.simulator.swings import (
     paper_pen,
     swing_poses,
 )
-from lightpen_extensions.simulator.view import Lamp, Optics, View, Window
 
 CAMERA = paper_camera()
 PEN = paper_pen()
@@ -104,7 +111,7 @@ def test_missing_led_leaves_the_others_as_they_are() -> None:
 def test_light_beyond_the_border_is_cut_off() -> None:
     lamp = Lamp(np.array([1.0, 80.0]), (10.0, 10.0), level=1.0)
     outside = Lamp(np.array([-90.0, 80.0]), (10.0, 10.0), level=1.0)
-    view = replace(DARK, lamps=(lamp, outside))
+    view = replace(DARK, others=(lamp, outside))
     light = render_view(SMALL, PEN, view, Optics())
     assert light.levels.shape == (160, 200)
     assert len(light.windows) == 1
@@ -117,11 +124,12 @@ def test_defocus_spreads_the_light_and_keeps_its_amount_and_center(
     radius: float,
 ) -> None:
     lamp = Lamp(np.array([90.3, 70.8]), (20.0, 15.0), level=1.0)
-    view = replace(DARK, lamps=(lamp,))
+    view = replace(DARK, others=(lamp,))
     sharp = render_view(SMALL, PEN, view, Optics())
-    soft = render_view(SMALL, PEN, view, Optics(defocus_radius=radius))
+    blurred = replace(view, others=(lamp, Defocus(radius)))
+    soft = render_view(SMALL, PEN, blurred, Optics())
     assert soft.levels.sum() == pytest.approx(sharp.levels.sum(), rel=1e-5)
-    np.testing.assert_allclose(centroid(soft, soft.windows[0]), lamp.center, atol=3e-4)
+    np.testing.assert_allclose(centroid(soft, soft.windows[-1]), lamp.center, atol=3e-4)
     edge = soft.levels[71, 102:120]
     assert (edge[(edge > 0.1) & (edge < 0.9)]).size >= radius
 
@@ -130,8 +138,8 @@ def test_finger_hides_what_is_behind_it() -> None:
     lamp = Lamp(np.array([100.0, 80.0]), (20.0, 20.0), level=1.0)
     # Its long lower side runs through the lamp's centre.
     finger = Finger(np.array([-50.0, 60.0]), np.array([250.0, 60.0]), 20.0)
-    view = replace(DARK, lamps=(lamp,))
-    shown = render_view(SMALL, PEN, replace(view, others=(finger,)), Optics())
+    view = replace(DARK, others=(lamp,))
+    shown = render_view(SMALL, PEN, replace(view, others=(lamp, finger)), Optics())
     free = render_view(SMALL, PEN, view, Optics())
     assert shown.levels[66, 100] < 1e-3
     assert shown.levels[94, 100] == pytest.approx(1, abs=1e-3)
@@ -196,6 +204,17 @@ def test_rendered_centroids_are_those_of_the_exact_discs() -> None:
         np.testing.assert_allclose(
             centroid(light, light.windows[0]), exact.centroids[led], atol=5e-4
         )
+
+
+def test_light_from_behind_grows_across_the_image() -> None:
+    view = replace(DARK, others=(Backlight(0.3, (0.2, -0.1)),))
+    light = render_view(SMALL, PEN, view, Optics(exposure=2.0))
+    assert light.windows == (Window(0, 160, 0, 200),)
+    assert light.levels[:, 0].mean() == pytest.approx(0.4, abs=0.002)
+    assert light.levels[:, -1].mean() == pytest.approx(0.8, abs=0.002)
+    assert light.levels[0].mean() - light.levels[-1].mean() == pytest.approx(
+        0.2, abs=0.002
+    )
 
 
 def test_blur_too_sharp_for_the_method_is_refused() -> None:

@@ -73,7 +73,7 @@ def test_set_holds_camera_pen_images_and_truth(tmp_path: Path) -> None:
     assert image.shape == (512, 612)
     image_plan = plan.image_plans[1]
     light = render_view(SMALL.camera, SMALL.pen, image_plan.view, image_plan.optics)
-    difference = image - 255.0 * (light.levels + light.background)
+    difference = image - 255.0 * light.levels
     # Shot noise of a bright pixel is 2.3 DN.
     assert np.abs(difference).max() < 14
     truth = read_truth(folder)

@@ -1,20 +1,18 @@
 import numpy as np
 import pytest
 
-from lightpen_extensions.simulator.render import Light
+from lightpen_extensions.simulator.render import Light, Window
 from lightpen_extensions.simulator.scenes import Sensor, expose
-from lightpen_extensions.simulator.view import Window
 
 SHAPE = (400, 500)
 WHOLE = Window(0, SHAPE[0], 0, SHAPE[1])
 
 
-def even_light(level: float, background: float = 0.0) -> Light:
-    return Light(np.full(SHAPE, level, dtype=np.float32), (WHOLE,), background)
+DARK = Light(np.zeros(SHAPE, dtype=np.float32), ())
 
 
-def dark_light(background: float, gradient: tuple[float, float] = (0, 0)) -> Light:
-    return Light(np.zeros(SHAPE, dtype=np.float32), (), background, gradient)
+def even_light(level: float) -> Light:
+    return Light(np.full(SHAPE, level, dtype=np.float32), (WHOLE,))
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
@@ -34,18 +32,12 @@ def test_mean_and_variance_are_those_of_shot_read_and_quantisation_noise(
     assert image.dtype == (np.uint8 if bits == 8 else np.uint16)
 
 
-@pytest.mark.parametrize(
-    ("bits", "background"), [(8, 0.0), (8, 0.02), (12, 0.0), (12, 0.02), (16, 0.001)]
-)
-def test_dark_pixels_read_as_if_each_were_drawn_on_its_own(
-    bits: int, background: float
-) -> None:
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_dark_pixels_read_as_if_each_were_drawn_on_its_own(bits: int) -> None:
     sensor = Sensor(bits=bits)  # type: ignore[arg-type]
-    image = expose(dark_light(background), sensor, np.random.default_rng(2))
+    image = expose(DARK, sensor, np.random.default_rng(2))
     rng = np.random.default_rng(3)
-    charge = background * sensor.full_well
-    sigma = np.hypot(np.sqrt(charge), sensor.read_noise)
-    charges = charge + sensor.offset + sigma * rng.standard_normal(SHAPE)
+    charges = sensor.offset + sensor.read_noise * rng.standard_normal(SHAPE)
     expected = np.clip(np.rint(charges / sensor.electrons_per_dn), 0, None)
     # Both scatter: five standard deviations of the difference.
     assert image.mean() == pytest.approx(
@@ -56,7 +48,7 @@ def test_dark_pixels_read_as_if_each_were_drawn_on_its_own(
 
 
 def test_dark_pixels_are_independent_of_their_neighbours() -> None:
-    image = expose(dark_light(0.0), Sensor(), np.random.default_rng(4)) > 0
+    image = expose(DARK, Sensor(), np.random.default_rng(4)) > 0
     share = image.mean()
     assert 0.005 < share < 0.02
     for shift in (1, SHAPE[1]):
@@ -74,13 +66,3 @@ def test_bright_light_reads_full_scale_and_no_more() -> None:
         assert sensor.full_scale == top
         image = expose(even_light(2.0), sensor, np.random.default_rng(5))
         np.testing.assert_array_equal(image, top)
-
-
-def test_background_adds_to_the_light_and_its_gradient_runs_across_the_image() -> None:
-    rng = np.random.default_rng(6)
-    lit = expose(even_light(0.3, background=0.1), Sensor(), rng)
-    assert lit.mean() == pytest.approx(0.4 * 255 + 0.1, abs=0.05)
-    image = expose(dark_light(0.3, gradient=(0.2, -0.1)), Sensor(), rng).astype(float)
-    assert image[:, 0].mean() == pytest.approx(0.2 * 255, abs=0.5)
-    assert image[:, -1].mean() == pytest.approx(0.4 * 255, abs=0.5)
-    assert image[0].mean() - image[-1].mean() == pytest.approx(0.1 * 255, abs=0.5)

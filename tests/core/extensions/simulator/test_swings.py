@@ -1,18 +1,20 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 from tests.simulated_disturbances import slip_tip
 from tests.simulated_pens import SAMPLE_PENS
+from tests.simulated_swings import SwingKind, swing_of_kind
 
 from lightpen.model.ellipse import ellipse_centers
 from lightpen_extensions.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,
     PAPER_TIP,
-    SWING_KINDS,
     Postures,
     edge_gaps,
     faces_camera,
@@ -20,7 +22,6 @@ from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
-    simulate_centers,
     swing_from_postures,
     swing_poses,
 )
@@ -29,20 +30,19 @@ CAMERA = paper_camera()
 PEN = paper_pen()
 
 
-@pytest.mark.parametrize("kind", SWING_KINDS)
-def test_tip_stays_in_the_cone(kind: str) -> None:
-    swing = swing_poses(40, np.random.default_rng(1), kind)  # type: ignore[arg-type]
+@pytest.mark.parametrize("kind", get_args(SwingKind))
+def test_tip_stays_in_the_cone(kind: SwingKind) -> None:
+    swing = swing_of_kind(40, np.random.default_rng(1), kind)
     tips = swing.rotations @ PAPER_TIP + swing.translations
     np.testing.assert_allclose(tips, np.tile(PAPER_CONE, (40, 1)), atol=1e-9)
     assert not swing.slipped.any()
 
 
 @pytest.mark.parametrize("name", SAMPLE_PENS)
-@pytest.mark.parametrize("kind", ["field", "cone"])
-def test_every_led_is_whole_and_clear_in_a_careful_swing(name: str, kind: str) -> None:
+def test_every_led_is_whole_and_clear_in_a_careful_swing(name: str) -> None:
     pen = SAMPLE_PENS[name]()
     rng = np.random.default_rng(2)
-    swing = swing_poses(60, rng, kind, pen=pen)  # type: ignore[arg-type]
+    swing = swing_poses(60, rng, pen=pen)
     leds, normals = leds_in_camera(pen, swing.rotations, swing.translations)
     pixels = CAMERA.project(leds)
     assert faces_camera(leds, normals).all()

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from benchmarks.small_records import SMALL
 from pyigtl import OpenIGTLinkClient, TransformMessage
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame, sealed
@@ -36,7 +37,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
     paper_pen,
-    simulate_centers,
 )
 from lightpen_extensions.stream.messages import StreamedTip, pose_messages, tip_metadata
 from lightpen_extensions.stream.server import (

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
@@ -32,7 +33,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
+from tests.simulated_swings import swing_of_kind
 
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pen_detection import detect_from_centers
@@ -26,7 +28,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 
@@ -132,7 +133,7 @@ def test_nothing_is_certain_before_the_postures_allow_a_joint_fit() -> None:
     assert kept.uncertainty == np.inf
     assert kept.seat is not None
     assert len(kept.misfits) == 7
-    upright = grown(swing_poses(20, np.random.default_rng(0), "upright"))
+    upright = grown(swing_of_kind(20, np.random.default_rng(0), "upright"))
     assert upright.joint is None
 
 

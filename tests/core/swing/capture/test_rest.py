@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_from_centers
@@ -25,7 +26,6 @@ from lightpen_extensions.simulator.swings import (
     Postures,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_from_postures,
 )
 

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
@@ -53,7 +54,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_poses,
 )
 

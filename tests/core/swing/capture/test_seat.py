@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.pose import Poses, fit_poses
 from lightpen.swing.capture.kept_images import fit_seat, tip_distances, tip_offsets
@@ -13,7 +14,6 @@ from lightpen_extensions.simulator.swings import (
     Postures,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_from_postures,
 )
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.uncertainty.prediction import PredictedUncertainty
@@ -29,7 +30,6 @@ from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
-    simulate_centers,
     swing_from_postures,
     swing_poses,
 )

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
@@ -27,7 +28,7 @@ from lightpen_extensions.measure.probing.probing import (
     with_taken,
 )
 from lightpen_extensions.measure.tasks.probed_point import ProbingFrame, StillFrames
-from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
+from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 RULES = ProbingRules(n_frames=5, n_settling=2)
 STILL = 7  # images of one touch by these rules

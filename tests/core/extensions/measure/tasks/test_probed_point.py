@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.touches import covered_share
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_poses
@@ -27,7 +28,7 @@ from lightpen_extensions.measure.tasks.probed_point import (
     point_sensitivities,
     with_tip,
 )
-from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
+from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
 

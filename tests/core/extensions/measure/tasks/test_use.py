@@ -5,6 +5,7 @@ from datetime import date
 
 import numpy as np
 import pytest
+from tests.simulated_centers import simulate_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -26,7 +27,6 @@ from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,
     paper_pen,
-    simulate_centers,
 )
 
 SIGMA = 0.01  # px
