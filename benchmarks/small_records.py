@@ -46,7 +46,6 @@ SMALL: Mapping[str, Any] = {
         "independent_noise_mm": None,
         "correlation_factor": 1.0,
         "led_sigma_mm": 0.0,
-        "distance_repeatability": 1e-5,
         "halves_difference_mm": ZERO,
         "halves_expanded_uncertainty_mm": ZERO,
     },

@@ -157,26 +157,16 @@ def recorded(found: Calibration, file: Path, created: datetime) -> CalibrationFi
 
 
 def swings_of_pen(
-    rng: np.random.Generator, n: int, folder: Path, knock: float, growth: float
-) -> tuple[list[CalibrationFile], CalibrationFile, CalibrationFile]:
-    """Return swings of a healthy pen, and one each after a fault.
-
-    Parameters
-    ----------
-    knock : float
-        By which an LED moved, mm.
-    growth : float
-        Of the pen, relative.
-    """
+    rng: np.random.Generator, n: int, folder: Path, knock: float
+) -> tuple[list[CalibrationFile], CalibrationFile]:
+    """Return swings of a healthy pen, and one after an LED moved by ``knock``, mm."""
     file = replace(paper_pen(), led_sigma=LED_SIGMA)
     camera, pen = true_camera(rng), true_pen(file, rng)
     leds = pen.leds.copy()
     leds[rng.integers(len(leds))] += knock * any_direction(rng)
-    grown = replace(pen, leds=(1 + growth) * pen.leds)
-    pens = [*[(pen, PAPER_TIP)] * n, (replace(pen, leds=leds), PAPER_TIP)]
     swings = []
-    for number, (each, tip) in enumerate([*pens, (grown, (1 + growth) * PAPER_TIP)]):
-        swing = swing_poses(N_IMAGES, rng, pen=each, camera=camera, tip_pen=tip)
+    for number, each in enumerate([*[pen] * n, replace(pen, leds=leds)]):
+        swing = swing_poses(N_IMAGES, rng, pen=each, camera=camera)
         seats = SEAT_SIGMA * rng.standard_normal(swing.translations.shape)
         poses = swing.rotations, swing.translations + seats
         pixels = simulate_centers(camera, each, *poses, SIGMA, rng)
@@ -185,7 +175,7 @@ def swings_of_pen(
         found = calibrate(paper_camera(), file, seen)
         created = datetime(2026, 1, 1 + number, tzinfo=UTC)
         swings.append(recorded(found, folder / f"swing {number + 1}.json", created))
-    return swings[:n], swings[n], swings[n + 1]
+    return swings[:n], swings[n]
 
 
 def held(

@@ -290,7 +290,6 @@ def test_a_pen_is_examined_by_its_results_alone(
     tmp_path: Path,
 ) -> None:
     folder = shared_data / "repeat"
-    inputs = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
     tables = [str(folder / f"calib_{i:02d}.csv") for i in range(1, 5)]
     results = [
         shutil.copy(
@@ -300,10 +299,8 @@ def test_a_pen_is_examined_by_its_results_alone(
         for i, table in enumerate(tables, 1)
     ]
 
-    examined = lightpen("verify", "pen", *results, *inputs)
-    by_results = lightpen("verify", "pen", *results)
+    examined = lightpen("verify", "pen", *results)
 
-    assert by_results.stdout == examined.stdout, by_results.stderr
     assert "No LED moved relative to the others in 4 swings." in examined.stdout
 
 

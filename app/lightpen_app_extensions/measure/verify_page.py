@@ -37,7 +37,6 @@ from lightpen_extensions.comparisons.pen_health import (
 from lightpen_extensions.measure.measuring.plan import artefact_plan
 
 LATEST = 8  # swings; the table has room for as many
-PPM = 1e6
 
 
 class PenPanel(Translated, QWidget):
@@ -55,7 +54,7 @@ class PenPanel(Translated, QWidget):
 
         # Widgets
         self._verdict = SignLabel()
-        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
+        head = self.tr("LEDs since the first swing / \xb5m")
         self._head = self.say(text_label(TextSize.SMALL, Tone.QUIET), head)
         self._table = self.say(NumberTable(), head)
 
@@ -147,8 +146,8 @@ class PenPanel(Translated, QWidget):
         return " " + text.format(self._shown.n_left_out)
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
-        """Return the shift of each LED and the growth of the pen, by swing."""
-        heads = *map(str, range(1, len(found.pen.leds) + 1)), self.tr("size")
+        """Return the shift of each LED, by swing."""
+        heads = tuple(map(str, range(1, len(found.pen.leds) + 1)))
         names, cells = [], []
         for swing, judged in list(zip(found.swings, health.swings, strict=True))[
             -LATEST:
@@ -156,9 +155,7 @@ class PenPanel(Translated, QWidget):
             names.append(moment_text(swing.when))
             lengths = np.linalg.norm(judged.shifts, axis=1) * MICROMETRES
             moves = (number_text(x, 0) if np.isfinite(x) else "" for x in lengths)
-            growth = judged.growth
-            size = "" if growth is None else number_text(PPM * growth.relative, 0)
-            cells.append((*moves, size))
+            cells.append(tuple(moves))
         return Figures(heads, tuple(names), tuple(cells))
 
 

@@ -106,13 +106,9 @@ def data_of(options: argparse.Namespace) -> Path:
     return folder
 
 
-def add_camera(
-    parser: argparse.ArgumentParser, meaning: str, *, is_required: bool = False
-) -> None:
+def add_camera(parser: argparse.ArgumentParser, meaning: str) -> None:
     """Add ``--camera``, and how the images differ from those that it is for."""
-    parser.add_argument(
-        "--camera", type=Path, required=is_required, metavar="FILE", help=meaning
-    )
+    parser.add_argument("--camera", type=Path, metavar="FILE", help=meaning)
     parser.add_argument(
         "--binning",
         type=int,

@@ -1,20 +1,13 @@
-"""The LEDs of a pen over its swings: whether one was knocked, or all grew together.
+"""The LEDs of a pen over its swings: whether one was knocked.
 
 Each calibration gives the displacement of each LED from its place in the file, except
 a move of the whole pen and, with one camera, its scale. What changed from the first
 swing on is stated by LED after the best move and scale of all are removed.
-
-The scale shows elsewhere. With a pen that grew by e since its LEDs were measured all
-distances come out smaller by e: a cone that stayed where it was seems to come nearer
-along its line of sight, ``w / f`` smaller, at the same place in the image. How well
-that repeats from swing to swing, their records state; a pen grew if the difference is
-more than chance and matters.
 """
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +16,6 @@ from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import hashed
 from lightpen.messages import message
-from lightpen.model.camera import Camera
-from lightpen.model.coverage import COVERAGE_FACTOR, normal_quantile
 from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import skew
@@ -35,7 +26,6 @@ from lightpen.swing.preparation import Preparation
 from lightpen_extensions.comparisons.assessment import (
     VerificationAssessment,
     accepted,
-    check,
     refused,
 )
 
@@ -43,21 +33,9 @@ MIN_SWINGS = 2
 MOST = 20  # swings of a pen that are read, the newest
 MOVED = 0.02  # mm, from which on an LED has moved
 STANDS_OUT = 5.0  # times the median change of all LEDs
-GROWN = 6e-5  # relative, from which on it matters: 0.006 mm of a tip 100 mm away
-BY_CHANCE = 0.01  # probability that an unchanged pen seems to have grown
-SAME_PLACE = 0.5  # px, in which a cone stays that did not move
-ALUMINIUM = 23e-6  # relative growth per K
 ROUNDS = 20
 MEASURE_AGAIN = message("pen-health.measure-again")
-MEASURE_LENGTH = message("pen-health.measure-length")
 KEEP_FILE = message("pen-health.keep-file")
-
-
-class Growth(NamedTuple):
-    """A change of the pen's size, and U (k = 2) of it, relative."""
-
-    relative: float
-    uncertainty: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +44,6 @@ class SwingOfPen:
 
     name: str
     shifts: FloatArray  # (L, 3), of LEDs since the first swing, mm; NaN if not seen
-    # Since the first swing that determines it; None for that swing, if cone or camera
-    # was moved, if the images contradict a file, or with several cameras.
-    growth: Growth | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,28 +52,23 @@ class PenHealth:
 
     swings: tuple[SwingOfPen, ...]
     moved: tuple[int, ...]  # numbers of the LEDs that moved, from 1
-    growth: Growth | None  # most significant; None where not determined
     assessment: VerificationAssessment
 
 
-def examine_pen(
-    calibrations: Sequence[CalibrationFile], camera: Camera | None, leds: FloatArray
-) -> PenHealth:
+def examine_pen(calibrations: Sequence[CalibrationFile], leds: FloatArray) -> PenHealth:
     """Examine a pen by at least two calibrations, the oldest first.
 
-    ``camera`` is the common camera of all swings, from its file; without it the growth
-    is not determined. ``leds`` (L, 3), mm, are the LEDs of the pen file. Raises
-    `UsageError` for different pens.
+    ``leds`` (L, 3), mm, are the LEDs of the pen file. Raises `UsageError` for different
+    pens.
     """
     require_one_pen(calibrations)
     if len(calibrations) < MIN_SWINGS:
         raise CalibrationError("pen-health.too-few")
-    first, sized = calibrations[0], next(filter(_has_size, calibrations), None)
+    first = calibrations[0]
     swings = [
         SwingOfPen(
             name=each.path.name,
             shifts=_without_move(leds, each.displacements - first.displacements),
-            growth=_growth(sized, each, camera) if camera and sized else None,
         )
         for each in calibrations
     ]
@@ -106,14 +76,7 @@ def examine_pen(
     usual = np.nanmedian(lengths[1:], axis=1, keepdims=True)
     stands_out = np.nan_to_num(lengths[1:]) > np.maximum(STANDS_OUT * usual, MOVED)
     moved = tuple((np.flatnonzero(stands_out.any(axis=0)) + 1).tolist())
-    growths = [each.growth for each in swings if each.growth is not None]
-    growth = max(growths, key=lambda g: abs(g.relative) / g.uncertainty, default=None)
-    return PenHealth(
-        swings=tuple(swings),
-        moved=moved,
-        growth=growth,
-        assessment=_assessment(swings, moved, growth, len(growths)),
-    )
+    return PenHealth(tuple(swings), moved, _assessment(swings, moved))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +96,7 @@ def read_pen_over_time(
     archive: FolderArchive, preparation: Preparation, report: Callable[[float], None]
 ) -> PenOverTime:
     """Read the accepted swings of the pen that is chosen."""
-    pen_file, camera_file = preparation.pen_file, preparation.camera_file
+    pen_file = preparation.pen_file
     if pen_file is None:
         raise ValueError("`pen_file` must be chosen.")
     pen_sha256 = hashed(pen_file.path).sha256
@@ -148,7 +111,6 @@ def read_pen_over_time(
                 found.append(swing)
         report(n / len(files))
     swings = tuple(sorted(found, key=lambda swing: swing.when))
-    camera = None if camera_file is None else camera_file.camera
     return PenOverTime(
         names=names,
         is_simulated=is_simulated,
@@ -157,7 +119,7 @@ def read_pen_over_time(
         swings=swings,
         n_left_out=len(files) - len(swings),
         health=(
-            examine_pen(swings, camera, pen_file.pen.leds)
+            examine_pen(swings, pen_file.pen.leds)
             if len(swings) >= MIN_SWINGS
             else None
         ),
@@ -196,43 +158,8 @@ def _without_move(leds: FloatArray, changes: FloatArray) -> FloatArray:
     return shifts
 
 
-def _growth(
-    first: CalibrationFile, now: CalibrationFile, camera: Camera
-) -> Growth | None:
-    is_other = now.camera_sha256 != first.camera_sha256
-    if now is first or is_other or not _has_size(now):
-        return None
-    one, other = _cone_seen(first, camera), _cone_seen(now, camera)
-    if one is None or other is None:
-        return None
-    if np.linalg.norm(one[:2] - other[:2]) > SAME_PLACE:
-        return None
-    own, of_first = (c.calibration.uncertainty for c in (now, first))
-    deviation = np.hypot(own.distance_repeatability, of_first.distance_repeatability)
-    spread = COVERAGE_FACTOR * float(deviation)
-    return Growth(float(np.log(one[2] / other[2])), spread)
-
-
-def _has_size(swing: CalibrationFile) -> bool:
-    """Return whether its distance is from the files, whose errors then cancel."""
-    return not (swing.is_of_rig or swing.calibration.adjusted.contradictions)
-
-
-def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | None:
-    """Return the image of the cone, px, and its depth over the focal length."""
-    fitted = np.array(calibration.calibration.instrument.intrinsics)
-    if len(fitted) != len(camera.intrinsics):
-        return None
-    seen_by = camera.with_intrinsics(fitted)
-    pixel = seen_by.project(calibration.cone_cam)
-    return np.append(pixel, calibration.cone_cam[2] / seen_by.fx)
-
-
 def _assessment(
-    swings: Sequence[SwingOfPen],
-    moved: tuple[int, ...],
-    growth: Growth | None,
-    n_growths: int,
+    swings: Sequence[SwingOfPen], moved: tuple[int, ...]
 ) -> VerificationAssessment:
     if moved:
         lengths = np.array([np.linalg.norm(each.shifts, axis=1) for each in swings])
@@ -247,17 +174,6 @@ def _assessment(
             ),
             MEASURE_AGAIN,
         )
-    if growth is not None:
-        # The most significant of several changes is larger by chance.
-        chance = normal_quantile(BY_CHANCE / (2 * n_growths)) / COVERAGE_FACTOR
-        if abs(growth.relative) > max(GROWN, chance * growth.uncertainty):
-            grown = message(
-                "pen-health.grown",
-                growth=1e6 * growth.relative,
-                uncertainty=1e6 * growth.uncertainty,
-                kelvin=growth.relative / ALUMINIUM,
-            )
-            return check(grown, MEASURE_LENGTH)
     return accepted(
         message("pen-health.good", n_swings=len(swings)), KEEP_FILE, Grade.STEADY
     )

@@ -2764,8 +2764,8 @@
 <context>
     <name>PenPanel</name>
     <message>
-        <source>LEDs since the first swing / µm, size of the pen / ppm</source>
-        <translation>自首次摆动以来各 LED 的位移 / µm，光笔尺寸变化 / ppm</translation>
+        <source>LEDs since the first swing / µm</source>
+        <translation>自首次摆动以来各 LED 的位移 / µm</translation>
     </message>
     <message>
         <source>Reading the swings of the pen.</source>
@@ -2778,10 +2778,6 @@
     <message>
         <source>Swings with another LED file, or unreadable: {0}.</source>
         <translation>使用其他 LED 文件或无法读取的摆动：{0}。</translation>
-    </message>
-    <message>
-        <source>size</source>
-        <translation>尺寸</translation>
     </message>
 </context>
 <context>
@@ -6252,10 +6248,6 @@
         <translation>用力按压的摆动仅供比较，不能接受。</translation>
     </message>
     <message>
-        <source>All LEDs changed by one scale factor, {growth:+.0f} ppm (U {uncertainty:.0f} ppm): the pen is {kelvin:+.1f} K warmer (aluminium), or the distance between cone and camera changed. No single LED moved.</source>
-        <translation>全部 LED 按同一比例变化 {growth:+.0f} ppm（U {uncertainty:.0f} ppm）：光笔温度变化 {kelvin:+.1f} K（铝），或锥座与相机的距离已改变。没有单个 LED 移动。</translation>
-    </message>
-    <message>
         <source>Camera {camera} is not synchronised with the first camera (about {lag}). This shifts the tip and may cause other warnings. Trigger all cameras by one signal, or hold the pen still for each image.</source>
         <translation>相机 {camera} 与第一台相机不同步（约 {lag}）。这会使测头位置偏移，并可能引起其他警告。请用同一信号触发全部相机，或在每次取图时保持光笔静止。</translation>
     </message>
@@ -7066,10 +7058,6 @@
     <message>
         <source>Next: inspect the pen, fix the LED, and measure the LEDs again.</source>
         <translation>下一步：检查光笔，固定该 LED，并重新测量各 LED。</translation>
-    </message>
-    <message>
-        <source>Next: let the pen reach room temperature, and measure a certified length.</source>
-        <translation>下一步：让光笔达到室温，并测量一段有证书的长度。</translation>
     </message>
     <message>
         <source>Next: use the points probed between the visits.</source>

@@ -121,9 +121,6 @@ class UncertaintyRecord(Struct, frozen=True):
         Ratio of the noise variance to that of independent images.
     led_sigma_mm
         Standard deviation of the errors of the LED file, estimated from the images.
-    distance_repeatability
-        Relative standard deviation of the distance of the cone by what differs from
-        swing to swing: noise, seat and drift.
     halves_difference_mm
         Difference of the tips from the odd and from the even images.
     """
@@ -132,7 +129,6 @@ class UncertaintyRecord(Struct, frozen=True):
     independent_noise_mm: Triple | None
     correlation_factor: float
     led_sigma_mm: Number
-    distance_repeatability: float
     halves_difference_mm: Triple
     halves_expanded_uncertainty_mm: Triple
 

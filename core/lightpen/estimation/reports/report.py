@@ -44,7 +44,6 @@ from lightpen.estimation.reports.report_warnings import (
     warnings_of,
 )
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.uncertainty.budget import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.opened_files import Inputs
 from lightpen.formats.own_json import THIS_PROGRAM, StoredMessage, file_entry, plain
@@ -173,9 +172,6 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
         independent_noise_mm=plain(noise),
         correlation_factor=plain(budget.correlation_factor),
         led_sigma_mm=plain(calibration.led_sigma),
-        distance_repeatability=distance_repeatability(
-            calibration.bundle, calibration.budget, calibration.priors
-        ),
         halves_difference_mm=plain(halves.difference),
         halves_expanded_uncertainty_mm=plain(halves.expanded_uncertainty),
     )

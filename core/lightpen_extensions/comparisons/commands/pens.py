@@ -6,23 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.commands.arguments import (
-    add_camera,
-    add_file,
-    add_json,
-    add_pen_options,
-    supervisor_signature,
-)
+from lightpen.commands.arguments import add_file, add_json, supervisor_signature
 from lightpen.commands.console import printing, require_other_file, shown
 from lightpen.errors import UsageError
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import all_hashed
 from lightpen.formats.own_json import file_entry
-from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.names import Origin
-from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.record.library.library_changes import Author
 from lightpen.record.recomputing import recompute, recorded_camera_and_pen
@@ -41,9 +31,7 @@ from lightpen_extensions.comparisons.commands.entering import (
     verdict_status,
 )
 from lightpen_extensions.comparisons.pen_health import (
-    GROWN,
     MOVED,
-    Growth,
     PenHealth,
     examine_pen,
     require_one_pen,
@@ -66,7 +54,6 @@ def add_verify_pen(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    add_camera_and_pen(parser, states_pen=False, is_required=False)
     add_exit_by_verdict(parser)
     add_json(parser)
     add_entering(parser)
@@ -74,50 +61,20 @@ def add_verify_pen(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _verify_pen(options: argparse.Namespace) -> int:
-    given = options.camera, options.pen
-    files = [*options.results, *filter(None, given)]
-    require_other_file(options.json, *files)
-    swings = _swings(options)
-    if None in given:  # the results contain both files
-        camera, pen = recorded_camera_and_pen(swings[0])
-    if options.camera is not None:
-        camera = read_camera(options.camera)
-    if options.pen is not None:
-        pen = _pen(options, swings[0])
-    found = examine_pen(swings, camera, pen.leds)
+    require_other_file(options.json, *options.results)
+    swings = sorted(map(read_calibration, options.results), key=lambda one: one.when)
+    _, pen = recorded_camera_and_pen(swings[0])
+    found = examine_pen(swings, pen.leds)
     print(shown(pen_health_text(found)))
     record = verification_record(
         "pen",
         pen_health_entries(found),
         found.assessment,
-        {"led_moved": MOVED, "relative_growth": GROWN},
-        {"files": [file_entry(file) for file in all_hashed(files)]},
+        {"led_moved": MOVED},
+        {"files": [file_entry(file) for file in all_hashed(options.results)]},
     )
     keep_record(options, record, swings[0])
     return verdict_status(options, found.assessment.grade)
-
-
-def _pen(options: argparse.Namespace, swing: CalibrationFile) -> Pen:
-    """Read the LED file, with what a calibration states where it does not."""
-    stated = swing.calibration.inputs
-    return read_pen(options.pen, stated.units, stated.led_diameter_mm, None)
-
-
-def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
-    """Read the calibrations, the oldest first; all must be with the same pen file."""
-    swings = sorted(map(read_calibration, options.results), key=lambda one: one.when)
-    pen, pen_sha256 = swings[0].calibration.inputs.pen.file, swings[0].pen_sha256
-    if options.pen is not None:
-        pen, pen_sha256 = options.pen, sha256(options.pen)
-    for each in swings:
-        if each.pen_sha256 != pen_sha256:
-            raise UsageError(
-                "cli.swing-of-another-pen",
-                result=each.path,
-                its_pen=each.calibration.inputs.pen.file,
-                pen=pen,
-            )
-    return swings
 
 
 def add_verify_press(parser: argparse.ArgumentParser) -> None:
@@ -185,31 +142,19 @@ def pen_health_entries(found: PenHealth) -> dict[str, Any]:
     """Return the entries of a pen's history."""
     return {
         "moved_leds": found.moved,
-        **_growth_entries(found.growth),
         "swings": [
-            {
-                "name": swing.name,
-                "shifts_mm": swing.shifts,
-                **_growth_entries(swing.growth),
-            }
-            for swing in found.swings
+            {"name": swing.name, "shifts_mm": swing.shifts} for swing in found.swings
         ],
     }
-
-
-def _growth_entries(found: Growth | None) -> dict[str, float | None]:
-    relative, uncertainty = found or (None, None)
-    return {"growth": relative, "growth_expanded_uncertainty": uncertainty}
 
 
 def pen_health_text(found: PenHealth) -> str:
     """Return a pen over its swings as text."""
     n_leds = len(found.swings[0].shifts)
     lines = [
-        "LEDs since the first swing, mm, and size of the pen, ppm",
+        "LEDs since the first swing, mm",
         f"{'Swing':<{TITLE}}"
-        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
-        + f"{'size':>{COLUMN}}{'U':>{COLUMN}}",
+        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds)),
     ]
     for swing in found.swings:
         lengths = np.linalg.norm(swing.shifts, axis=1)
@@ -217,11 +162,7 @@ def pen_health_text(found: PenHealth) -> str:
             f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
             for x in lengths
         )
-        size = "".join(
-            f"{'-' if ppm is None else format(1e6 * ppm, '+.0f'):>{COLUMN}}"
-            for ppm in swing.growth or (None, None)
-        )
-        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}")
     by_rule = verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)
     return "\n".join([*lines, "", *by_rule])
 
@@ -235,22 +176,3 @@ def press_test_text(found: PressTest) -> str:
     return "\n".join(
         [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
     )
-
-
-def add_camera_and_pen(
-    parser: argparse.ArgumentParser,
-    *,
-    states_pen: bool = True,
-    is_required: bool = True,
-) -> None:
-    """Add ``--camera`` and ``--pen``, and the options of the pen."""
-    add_camera(parser, "intrinsics file of the camera", is_required=is_required)
-    parser.add_argument(
-        "--pen",
-        type=Path,
-        required=is_required,
-        metavar="FILE",
-        help="LED file of the pen",
-    )
-    if states_pen:
-        add_pen_options(parser)

@@ -16,46 +16,21 @@ from lightpen_extensions.comparisons.pen_health import (
     _without_move,
     examine_pen,
 )
-from lightpen_extensions.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.swings import paper_pen
 
-CAMERA, PEN = paper_camera(), paper_pen()
-LEDS = PEN.leds
+LEDS = paper_pen().leds
 STILL: FloatArray = np.zeros_like(LEDS)
-CONE = np.array([10.0, 20.0, 1000.0])
 
 
-def swing(
-    number: int,
-    displacements: FloatArray = STILL,
-    *,
-    growth: float = 0.0,
-    cone: FloatArray = CONE,
-    repeatability: float = 1e-9,
-    camera: str = "camera",
-    pen: str = "pen",
-    is_of_rig: bool = False,
-    is_contradicted: bool = False,
-    n_intrinsics: int = len(CAMERA.intrinsics),
-) -> Any:
-    """The figures of a calibration with a pen that grew."""
-    record = SimpleNamespace(
-        adjusted=SimpleNamespace(contradictions=(1,) if is_contradicted else ()),
-        uncertainty=SimpleNamespace(distance_repeatability=repeatability),
-        instrument=SimpleNamespace(intrinsics=CAMERA.intrinsics[:n_intrinsics]),
-    )
+def swing(number: int, displacements: FloatArray = STILL, *, pen: str = "pen") -> Any:
+    """The figures of a calibration."""
     return SimpleNamespace(
-        path=Path(f"swing {number}.json"),
-        pen_sha256=pen,
-        camera_sha256=camera,
-        displacements=displacements,
-        cone_cam=cone * np.exp(-growth),
-        is_of_rig=is_of_rig,
-        calibration=record,
+        path=Path(f"swing {number}.json"), pen_sha256=pen, displacements=displacements
     )
 
 
 def examined(*swings: Any) -> PenHealth:
-    return examine_pen(swings, CAMERA, LEDS)
+    return examine_pen(swings, LEDS)
 
 
 def one_led(by: float, led: int = 4) -> FloatArray:
@@ -110,88 +85,6 @@ def test_of_leds_that_moved_the_farthest_is_named_with_its_swing() -> None:
     said = found.assessment.reason.values
     assert (said["led"], said["swing"]) == (4, "swing 3.json")
     assert said["distance"] == pytest.approx(0.08, abs=1e-4)
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(
-    ("growths", "repeatability", "least"),
-    [
-        ([1.0], 1e-9, 6e-5),  # it matters
-        # More than chance: of one change, and of the larger one of two.
-        ([1.0], 1e-4, 2.575829 * np.sqrt(2) * 1e-4),
-        ([0.5, 1.0], 1e-4, 2.807034 * np.sqrt(2) * 1e-4),
-        ([1.0, 0.5], 1e-4, 2.807034 * np.sqrt(2) * 1e-4),
-    ],
-)
-@pytest.mark.parametrize("by", [0.999, 1.001])
-def test_a_pen_has_grown_by_more_than_chance_and_more_than_matters(
-    sign: int, growths: list[float], repeatability: float, least: float, by: float
-) -> None:
-    largest = sign * by * least
-    found = examined(
-        swing(0, repeatability=repeatability),
-        *(
-            swing(i, growth=largest * each, repeatability=repeatability)
-            for i, each in enumerate(growths, 1)
-        ),
-    )
-
-    assert found.growth is not None
-    assert found.growth.relative == pytest.approx(largest)
-    assert found.growth.uncertainty == pytest.approx(2 * np.sqrt(2) * repeatability)
-    assert found.assessment.grade is (Grade.CHECK if by > 1 else Grade.STEADY)
-    said = found.assessment.reason.values
-    if by > 1:
-        assert said["growth"] == pytest.approx(1e6 * largest)
-        assert said["uncertainty"] == pytest.approx(1e6 * found.growth.uncertainty)
-        assert said["kelvin"] == pytest.approx(largest / 23e-6)
-    else:
-        assert said["n_swings"] == 1 + len(growths)
-
-
-def test_the_most_significant_growth_counts_not_the_largest() -> None:
-    found = examined(
-        swing(0), swing(1, growth=2e-4, repeatability=1e-4), swing(2, growth=1e-4)
-    )
-
-    assert found.growth is not None
-    assert found.growth.relative == pytest.approx(1e-4)
-
-
-@pytest.mark.parametrize(("pixels", "is_known"), [(0.49, True), (0.51, False)])
-def test_a_growth_is_known_while_the_cone_stays_within_half_a_pixel(
-    pixels: float, is_known: bool
-) -> None:
-    moved = CONE + np.array([pixels * CONE[2] / CAMERA.fx, 0.0, 0.0])
-    found = examined(swing(0), swing(1, cone=moved, growth=1e-3))
-
-    assert (found.growth is not None) == is_known
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        {"camera": "another"},
-        {"is_of_rig": True},
-        {"is_contradicted": True},
-        {"n_intrinsics": 4},
-    ],
-)
-def test_a_growth_is_known_from_swings_of_one_camera_that_agree_with_their_files(
-    other: dict[str, Any],
-) -> None:
-    usual = swing(1, growth=1e-3)
-    unlike, later = swing(0, **other), swing(2, growth=3e-3)
-
-    def growths(*swings: Any) -> list[bool]:
-        return [each.growth is not None for each in examined(*swings).swings]
-
-    assert growths(usual, unlike) == [False, False]
-    assert growths(usual, unlike, later) == [False, False, True]
-    # One that tells nothing of the size cannot be the first; one of others is.
-    has_size = "camera" in other or "n_intrinsics" in other
-    assert growths(unlike, usual, later) == [False, False, not has_size]
-    assert examine_pen([usual, later], None, LEDS).growth is None
 
 
 def test_one_swing_or_two_pens_are_refused() -> None:

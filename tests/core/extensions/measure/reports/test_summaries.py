@@ -20,7 +20,7 @@ from lightpen_extensions.comparisons.commands.pens import (
     pen_health_text,
     press_test_text,
 )
-from lightpen_extensions.comparisons.pen_health import Growth, PenHealth, SwingOfPen
+from lightpen_extensions.comparisons.pen_health import PenHealth, SwingOfPen
 from lightpen_extensions.comparisons.press_test import PressTest
 from lightpen_extensions.comparisons.repeatability import (
     Repeatability,
@@ -106,24 +106,23 @@ def test_a_press_test_shows_each_change_and_its_uncertainty() -> None:
     np.testing.assert_array_equal(found.entries["tip_change_mm"], change)
 
 
-def test_a_pen_shows_the_move_of_each_led_and_its_growth() -> None:
+def test_a_pen_shows_the_move_of_each_led() -> None:
     moved = np.array([[0.0, 0.003, 0.004], [np.nan] * 3])
     swings = (
-        SwingOfPen("the name of a swing that is too long", np.zeros((2, 3)), None),
-        SwingOfPen("second", moved, Growth(1.26e-4, 2e-5)),
+        SwingOfPen("the name of a swing that is too long", np.zeros((2, 3))),
+        SwingOfPen("second", moved),
     )
-    found = PenHealth(swings, (1,), Growth(1.26e-4, 2e-5), DOUBT)
+    found = PenHealth(swings, (1,), DOUBT)
 
     assert pen_health_text(found).splitlines()[1:] == [
-        f"{'Swing':24}{'LED 1':>10}{'LED 2':>10}{'size':>10}{'U':>10}",
-        f"the name of a swing that{'0.000':>10}{'0.000':>10}{'-':>10}{'-':>10}",
-        f"{'second':24}{'0.005':>10}{'-':>10}{'+126':>10}{'+20':>10}",
+        f"{'Swing':24}{'LED 1':>10}{'LED 2':>10}",
+        f"the name of a swing that{'0.000':>10}{'0.000':>10}",
+        f"{'second':24}{'0.005':>10}{'-':>10}",
         *VERDICT,
     ]
     entries = pen_health_entries(found)
-    assert entries["growth"] == 1.26e-4
-    assert entries["growth_expanded_uncertainty"] == 2e-5
-    assert [each["growth"] for each in entries["swings"]] == [None, 1.26e-4]
+    assert entries["moved_leds"] == (1,)
+    assert [each["name"] for each in entries["swings"]][1:] == ["second"]
 
 
 def repeated(n_tips: int, *, has_control: bool) -> Repeatability:
