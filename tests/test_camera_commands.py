@@ -69,31 +69,6 @@ def test_a_camera_file_is_made_of_a_folder_of_images(
 
 
 @pytest.mark.slow
-def test_named_images_take_no_part(pairs: Path, tmp_path: Path) -> None:
-    record_file = tmp_path / "record.json"
-    run(
-        *("intrinsics", pairs / "left", "--board", BOARD, "--leave-out", "3.png"),
-        *("--out", tmp_path / "camera.yaml", "--json", record_file),
-    )
-
-    names = [view["name"] for view in json.loads(record_file.read_text())["views"]]
-    assert names == ["0.png", "1.png", "2.png", "4.png", "5.png", "6.png", "7.png"]
-
-
-def test_an_unknown_name_to_leave_out_is_refused(
-    pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status = run(
-        *("intrinsics", pairs / "left", "--board", BOARD, "--leave-out", "9.png"),
-        *("--out", tmp_path / "camera.yaml"),
-    )
-
-    assert status == 2
-    assert "9.png is none of the images" in capsys.readouterr().err
-    assert not (tmp_path / "camera.yaml").exists()
-
-
-@pytest.mark.slow
 def test_the_rig_file_of_two_cameras_is_read_back(
     pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -2,11 +2,8 @@
 
 import argparse
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from lightpen.commands.arguments import add_json, number_from
 from lightpen.commands.console import (
@@ -28,13 +25,13 @@ from lightpen.messages import printable
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import observe_board, observe_board_of_rig
-from lightpen_extensions.boards.pair import SCALE_SIGMA, calibrate_pair
-from lightpen_extensions.boards.report import (
-    intrinsics_record,
-    intrinsics_text,
+from lightpen_extensions.boards.pair import (
+    SCALE_SIGMA,
+    calibrate_pair,
     pair_record,
     pair_text,
 )
+from lightpen_extensions.boards.report import intrinsics_record, intrinsics_text
 
 SIDES = ("left", "right")
 
@@ -60,14 +57,6 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         "--serial", default="", metavar="TEXT", help="serial number of the camera"
     )
     _add_temperature(parser)
-    parser.add_argument(
-        "--leave-out",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="file names of images to exclude",
-    )
     add_json(parser)
 
 
@@ -141,13 +130,8 @@ def _intrinsics(options: argparse.Namespace) -> None:
     require_other_file(options.json, *source.files, options.out)
     _require_new_file(options.out, *source.files)
     with progress("Finding the board") as report:
-        observed = observe_board(source, board, _part(report, 0.0, 0.7))
-        views = observed.views
-        _require_known(options.leave_out, source.names)
-        kept = ~np.isin(views.names, options.leave_out)
-        calibration = calibrate_camera(
-            views.chosen(kept), local_now().date(), _part(report, 0.7, 1.0)
-        )
+        observed = observe_board(source, board, report)
+    calibration = calibrate_camera(observed.views, local_now().date())
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
     )
@@ -209,12 +193,6 @@ def _extrinsics(options: argparse.Namespace) -> None:
         write_record(options.json, plain(record))
 
 
-def _part(
-    report: Callable[[float], None], begin: float, end: float
-) -> Callable[[float], None]:
-    return lambda fraction: report(begin + (end - begin) * fraction)
-
-
 def _require_names(names: tuple[str, str]) -> None:
     """Refuse names that are alike, or that no file can have."""
     are_plain = all(re.fullmatch(r"[\w.-]+", name) for name in names)
@@ -228,12 +206,6 @@ def _require_new_file(out: Path, *inputs: Path) -> None:
     """Refuse to write over one of the files that it is made from."""
     if any(are_same(path, out) for path in inputs):
         raise UsageError("cli.cameras-over-input", out=out)
-
-
-def _require_known(left_out: list[str], names: tuple[str, ...]) -> None:
-    for name in left_out:
-        if name not in names:
-            raise UsageError("cli.no-such-image", name=printable(name))
 
 
 def _from_there(file: Path, rig_file: Path) -> str:

@@ -49,10 +49,9 @@ class Choice:
     @property
     def message(self) -> Message:
         """The lens model and its cross-validated error as text."""
-        own = self.held_out[self.n_coefficients]
-        if self.n_coefficients == FISHEYE:
+        n, own = self.n_coefficients, self.held_out[self.n_coefficients]
+        if n == FISHEYE:
             return message("intrinsics.fisheye", held_out=own)
-        n = self.n_coefficients
         return message("intrinsics.brown", n_coefficients=n, held_out=own)
 
 

@@ -14,7 +14,7 @@ from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import NONE, Pairing
 from lightpen.messages import Message, message, printable
 from lightpen_extensions.boards.boards import Board, BoardKind
-from lightpen_extensions.boards.sightings import count_corners, find_points, for_search
+from lightpen_extensions.boards.sightings import count_corners, find_points
 
 SAME = 0.002  # of the image's longer side: distance of the points, rms
 COMMON = 0.8  # of the points of the view that shows fewer
@@ -234,7 +234,7 @@ def _why_unseen(source: ImageSource, board: Board) -> Message:
     """Return why the board is not found."""
 
     def images() -> Iterator[Image]:
-        return (for_search(load()) for load in islice(source.open(), EXAMINED))
+        return (load() for load in islice(source.open(), EXAMINED))
 
     return why_unseen(images, board) or message(
         "intrinsics.unseen", n_images=len(source.names), board=board.name

@@ -8,6 +8,7 @@ same in all views.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.rigid import Rig, of_camera, vector_from_rotation
 from lightpen_extensions.boards.adjustment import (
     FINEST,
@@ -34,9 +36,19 @@ from lightpen_extensions.boards.calibration import (
 from lightpen_extensions.boards.changes import USELESS
 from lightpen_extensions.boards.effects import views_without_field
 from lightpen_extensions.boards.observing import (
+    ObservedBoard,
     Views,
     message_on_duplicates,
     without_duplicates,
+)
+from lightpen_extensions.boards.report import (
+    PINHOLE,
+    TITLE,
+    board_line,
+    board_record,
+    camera_record,
+    left_out_lines,
+    remark_lines,
 )
 from lightpen_extensions.boards.start import BoardPoses, start_board_poses
 
@@ -254,3 +266,72 @@ def _alike(rotations: FloatArray, translations: FloatArray) -> BoolArray:
     apart = np.linalg.norm(ours - translations, axis=-1)
     far = np.linalg.norm(ours, axis=-1)
     return np.asarray((turns < ALIKE_TURN) & (apart < ALIKE_SHIFT * far))
+
+
+def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
+    """Return the calibration of two cameras as text for the screen."""
+    rig, fitted = calibration.rig, calibration.adjustment
+    assert rig.covariance is not None
+    u = COVERAGE_FACTOR * np.sqrt(np.diag(rig.covariance))
+    turn = np.degrees(vector_from_rotation(rig.rotations[1]))
+    one, other = rig.names
+    lines = [
+        f"{other} from {one}".ljust(30) + "".join(f"{axis:>13}" for axis in "xyz"),
+        _row("Turn, degrees", turn),
+        _row("  U (k = 2)", np.degrees(u[:3])),
+        _row("Translation, mm", rig.translations[1]),
+        _row("  U (k = 2)", u[3:]),
+        "",
+        f"{'Baseline':<{TITLE}}{calibration.baseline:.3f} mm, U = "
+        f"{COVERAGE_FACTOR * calibration.baseline_sigma:.3f} mm",
+        f"{'Views':<{TITLE}}{calibration.n_pairs} of both cameras used, of "
+        f"{observed.views.n_views}",
+        f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms",
+        *left_out_lines(calibration.left_out, "of one camera, or the cameras differ"),
+    ]
+    for name, camera in zip(rig.names, rig.cameras, strict=True):
+        four = zip(PINHOLE, camera.intrinsics.tolist(), strict=False)
+        values = [f"{n} {value:.2f}" for n, value in four]
+        if camera.covariance is not None:
+            of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
+            values = [f"{v} \u00b1 {b:.2f}" for v, b in zip(values, of, strict=False)]
+        lines.append(f"{name[: TITLE - 1]:<{TITLE}}{', '.join(values)} px")
+    lines += [board_line(fitted), *remark_lines(calibration.remarks)]
+    return "\n".join(lines)
+
+
+def pair_record(
+    calibration: PairCalibration, observed: ObservedBoard
+) -> dict[str, Any]:
+    """Return the calibration of two cameras as a record."""
+    rig, fitted = calibration.rig, calibration.adjustment
+    return {
+        "kind": "extrinsics",
+        "board": calibration.views.board.name,
+        "cameras": [
+            {"name": name, **camera_record(camera)}
+            for name, camera in zip(rig.names, rig.cameras, strict=True)
+        ],
+        "cam_from_rig_rotation": rig.rotations[1],
+        "cam_from_rig_translation_mm": rig.translations[1],
+        "extrinsics_covariance": rig.covariance,
+        "baseline_mm": calibration.baseline,
+        "baseline_expanded_uncertainty_mm": (
+            COVERAGE_FACTOR * calibration.baseline_sigma
+        ),
+        "rms_px": fitted.rms,
+        "noise_px": fitted.sigma,
+        "views_of_both": calibration.n_pairs,
+        "board_found": board_record(fitted),
+        "views": [
+            {"name": name, "rms_px": rms}
+            for name, rms in zip(calibration.views.names, fitted.view_rms, strict=True)
+        ],
+        "views_left_out": calibration.left_out,
+        "images_without_board": observed.unseen,
+        "remarks": calibration.remarks,
+    }
+
+
+def _row(title: str, values: FloatArray) -> str:
+    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)

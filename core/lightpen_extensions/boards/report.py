@@ -1,4 +1,4 @@
-"""The calibration of one camera, or of two, as text and as a record."""
+"""The calibration of a camera as text and as a record, and parts of those of two."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,12 +9,10 @@ from lightpen.arrays import FloatArray
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR
-from lightpen.model.rigid import vector_from_rotation
 from lightpen_extensions.boards.adjustment import N_SHAPE, BoardFit
 from lightpen_extensions.boards.calibration import CameraCalibration
 from lightpen_extensions.boards.distortion import choice_record, map_uncertainty
 from lightpen_extensions.boards.observing import ObservedBoard, Views
-from lightpen_extensions.boards.pair import PairCalibration
 
 COLUMNS, ROWS = 4, 3
 PINHOLE = ("fx", "fy", "cx", "cy")
@@ -67,7 +65,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
         "",
         f"{'Views':<{TITLE}}{calibration.views.n_views} used, the board found in "
         f"{n_found} of {n_found + len(observed.unseen)} images",
-        *_left_out_lines(calibration.left_out, "they fit no other"),
+        *left_out_lines(calibration.left_out, "they fit no other"),
     ]
     if calibration.n_points_left_out:
         lines.append(f"  points     {calibration.n_points_left_out} left out")
@@ -78,8 +76,8 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
         f"{'Projection':<{TITLE}}standard uncertainty {uncertain.center:.4f} px in the "
         f"middle, {uncertain.typical:.4f} px over the image, {uncertain.worst:.4f} px "
         "at worst",
-        _board_line(fitted),
-        *_remark_lines(calibration.remarks),
+        board_line(fitted),
+        *remark_lines(calibration.remarks),
     ]
     return "\n".join(lines)
 
@@ -96,7 +94,7 @@ def intrinsics_record(
     return {
         "kind": "intrinsics",
         "board": views.board.name,
-        **_camera_record(camera),
+        **camera_record(camera),
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
         "held_out_rms_px": calibration.held_out_rms,
@@ -113,7 +111,7 @@ def intrinsics_record(
             "standard_uncertainty_px": uncertain.sigmas,
         },
         "residuals_by_region": residuals_by_region(views, fitted.residuals),
-        "board_found": _board_record(fitted),
+        "board_found": board_record(fitted),
         "views": [
             {
                 "name": name,
@@ -132,80 +130,13 @@ def intrinsics_record(
     }
 
 
-def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
-    """Return the calibration of two cameras as text for the screen."""
-    rig, fitted = calibration.rig, calibration.adjustment
-    assert rig.covariance is not None
-    u = COVERAGE_FACTOR * np.sqrt(np.diag(rig.covariance))
-    turn = np.degrees(vector_from_rotation(rig.rotations[1]))
-    one, other = rig.names
-    lines = [
-        f"{other} from {one}".ljust(30) + "".join(f"{axis:>13}" for axis in "xyz"),
-        _row("Turn, degrees", turn),
-        _row("  U (k = 2)", np.degrees(u[:3])),
-        _row("Translation, mm", rig.translations[1]),
-        _row("  U (k = 2)", u[3:]),
-        "",
-        f"{'Baseline':<{TITLE}}{calibration.baseline:.3f} mm, U = "
-        f"{COVERAGE_FACTOR * calibration.baseline_sigma:.3f} mm",
-        f"{'Views':<{TITLE}}{calibration.n_pairs} of both cameras used, of "
-        f"{observed.views.n_views}",
-        f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms",
-        *_left_out_lines(calibration.left_out, "of one camera, or the cameras differ"),
-    ]
-    for name, camera in zip(rig.names, rig.cameras, strict=True):
-        four = zip(PINHOLE, camera.intrinsics.tolist(), strict=False)
-        values = [f"{n} {value:.2f}" for n, value in four]
-        if camera.covariance is not None:
-            of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
-            values = [f"{v} \u00b1 {b:.2f}" for v, b in zip(values, of, strict=False)]
-        lines.append(f"{name[: TITLE - 1]:<{TITLE}}{', '.join(values)} px")
-    lines += [_board_line(fitted), *_remark_lines(calibration.remarks)]
-    return "\n".join(lines)
-
-
-def pair_record(
-    calibration: PairCalibration, observed: ObservedBoard
-) -> dict[str, Any]:
-    """Return the calibration of two cameras as a record."""
-    rig, fitted = calibration.rig, calibration.adjustment
-    return {
-        "kind": "extrinsics",
-        "board": calibration.views.board.name,
-        "cameras": [
-            {"name": name, **_camera_record(camera)}
-            for name, camera in zip(rig.names, rig.cameras, strict=True)
-        ],
-        "cam_from_rig_rotation": rig.rotations[1],
-        "cam_from_rig_translation_mm": rig.translations[1],
-        "extrinsics_covariance": rig.covariance,
-        "baseline_mm": calibration.baseline,
-        "baseline_expanded_uncertainty_mm": (
-            COVERAGE_FACTOR * calibration.baseline_sigma
-        ),
-        "rms_px": fitted.rms,
-        "noise_px": fitted.sigma,
-        "views_of_both": calibration.n_pairs,
-        "board_found": _board_record(fitted),
-        "views": [
-            {"name": name, "rms_px": rms}
-            for name, rms in zip(calibration.views.names, fitted.view_rms, strict=True)
-        ],
-        "views_left_out": calibration.left_out,
-        "images_without_board": observed.unseen,
-        "remarks": calibration.remarks,
-    }
-
-
-def _row(title: str, values: FloatArray) -> str:
-    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
-
-
-def _left_out_lines(names: tuple[str, ...], why: str) -> list[str]:
+def left_out_lines(names: tuple[str, ...], why: str) -> list[str]:
+    """Return the line on views that were excluded, if there are any."""
     return [f"  left out   {', '.join(names)}: {why}"] if names else []
 
 
-def _board_line(fitted: BoardFit) -> str:
+def board_line(fitted: BoardFit) -> str:
+    """Return the line on the shape of the board."""
     stretch, shear, *bends = fitted.state.shape.tolist()
     return (
         f"{'Board':<{TITLE}}stretched by {1e6 * stretch:+.0f} ppm, sheared by "
@@ -215,11 +146,13 @@ def _board_line(fitted: BoardFit) -> str:
     )
 
 
-def _remark_lines(remarks: tuple[Message, ...]) -> list[str]:
+def remark_lines(remarks: tuple[Message, ...]) -> list[str]:
+    """Return the lines of remarks below the rest."""
     return ["", *map(str, remarks)] if remarks else []
 
 
-def _camera_record(camera: Camera) -> dict[str, Any]:
+def camera_record(camera: Camera) -> dict[str, Any]:
+    """Return the record of the intrinsics."""
     names = (*PINHOLE, *camera.distortion_names)
     record = {
         "image_size": camera.image_size,
@@ -233,7 +166,8 @@ def _camera_record(camera: Camera) -> dict[str, Any]:
     return record
 
 
-def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
+def board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
+    """Return the record of the shape of the board."""
     sigmas = np.sqrt(np.diag(fitted.covariance)[-N_SHAPE:])
     return {
         name: {"value": value, "standard_uncertainty": sigma}

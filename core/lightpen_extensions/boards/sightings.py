@@ -145,12 +145,6 @@ def count_corners(image: Image) -> tuple[int, int] | None:
     return None
 
 
-def for_search(image: Image) -> Image:
-    """Return an image reduced to the size in which boards are searched."""
-    small, _ = _smaller(_to_8_bit(image))
-    return np.asarray(small, dtype=np.uint8)
-
-
 def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return np.asarray(image, dtype=np.uint8)
