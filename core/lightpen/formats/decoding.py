@@ -33,7 +33,7 @@ from lightpen.messages import Message, message
 IMAGE_FILE = message("file.image")
 MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
 MAX_STACK_SIZE = 10**12  # bytes, of all pages of a TIFF
-TIFF_SUFFIXES = (".tif", ".tiff", ".btf", ".tf8")
+TIFF_SUFFIXES = (".tif", ".tiff", ".btf", ".tf8", ".stk", ".lsm")
 MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
 MAX_PNG_CHUNKS = (
@@ -208,6 +208,8 @@ def _decoded(data: bytes, name: str) -> npt.NDArray[Any]:
         _check_png(data, name)
     elif data.startswith(b"\xff\xd8"):
         _check_jpeg(data, name)
+    elif data[:2] in (b"P2", b"P3"):
+        data += b"\n"  # which OpenCV needs after the last number
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:

@@ -24,8 +24,9 @@ _PNM_HEAD = re.compile(
 )
 _PNM_HEAD_LENGTH = 4096  # bytes, with comments
 _BMP_HEAD_OF_OS2 = 12  # bytes
-_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_JPEG_FRAMES = frozenset((*range(0xC0, 0xD0), 0xF7)) - {0xC4, 0xC8, 0xCC}
 _JPEG_PROGRESSIVE = frozenset({0xC2, 0xCA})
+_JPEG_LOSSLESS = frozenset({0xC3, 0xC7, 0xCB, 0xCF, 0xF7})
 _JPEG_SCAN = 0xDA
 _JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
 _JPEG_MARKERS = 1000  # before the pixels; a colour profile takes 255
@@ -140,6 +141,9 @@ def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
             depth, height, width, channels = struct.unpack(
                 ">BHHB", _exactly(stream, 6, name)
             )
+            if marker in _JPEG_LOSSLESS or depth == 12:
+                kind = "lossless or 12-bit JPEG"
+                raise FileError("image.kind", name=name, kind=kind)
             if frame or depth != 8 or channels not in (1, 3, 4):
                 raise damaged_image(name)
             frame, pixels, length = marker, (width, height), length - 6

@@ -219,8 +219,15 @@ class MemoryRoom:
         return largest is not None and (self._n + 1) * largest <= self._budget
 
 
-SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".pnm", ".webp")
-VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
+SUFFIXES = (
+    *TIFF_SUFFIXES,
+    *(".png", ".bmp", ".jpg", ".jpeg", ".jpe", ".jfif", ".webp"),
+    *(".pgm", ".pnm", ".ppm", ".pbm"),
+)
+VIDEO_SUFFIXES = (
+    *(".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm"),
+    *(".mjpeg", ".mjpg", ".ts", ".mts", ".m2ts", ".wmv", ".flv", ".y4m", ".3gp"),
+)
 IMAGE_FOLDER = "images"
 IN_FLIGHT = 4  # images per thread that may wait in memory
 LOOKED_AT_FIRST = 4  # images, whether they are raw ones of a colour camera
@@ -244,7 +251,22 @@ class ImageSource:
 
     def of_bits(self, bits: int | None) -> "ImageSource":
         """Return these images of a stated bit depth, if it is stated."""
-        return self if bits is None else replace(self, full_scale=2**bits - 1)
+        if bits is None:
+            return self
+
+        def loaders() -> Iterator[Callable[[], Image]]:
+            return (partial(_right_aligned, load, bits) for load in self.open())
+
+        return replace(self, open=loaders, full_scale=2**bits - 1)
+
+
+def _right_aligned(load: Callable[[], Image], bits: int) -> Image:
+    """Return an image with its bits at the low end, whichever its file has them at."""
+    image = load()
+    if image.max(initial=0) < 2**bits:
+        return image
+    shift = 8 * image.itemsize - bits
+    return np.right_shift(image, shift, dtype=image.dtype)
 
 
 def look_at_all(
@@ -356,7 +378,7 @@ def _page(file: Path, page: PagePlace | FileError | None) -> Image:
 
 def _stated_full_scale(files: list[Path]) -> int | None:
     """Return the full scale that the first file states, if it is readable."""
-    if not files or files[0].suffix.lower() not in (".pgm", ".pnm"):
+    if not files or files[0].suffix.lower() not in (".pgm", ".pnm", ".ppm"):
         return None
     try:
         with opened(files[0], IMAGE_FILE, MAX_FILE_SIZE) as stream:
@@ -406,7 +428,7 @@ def _without_images(folder: Path, where: str) -> FileError:
 
 def _image_files_in(folder: Path) -> list[Path]:
     files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
-    return [file for file in files if not file.name.startswith("._")]  # of macOS
+    return [file for file in files if file.name[0] not in ".~"]  # hidden, or open
 
 
 def _video(path: Path) -> ImageSource:

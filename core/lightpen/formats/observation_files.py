@@ -19,7 +19,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import HEAD, MEGABYTE, read_bytes
+from lightpen.formats.files import HEAD, MEGABYTE, quoted, read_bytes
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
     SEQUENCE_SUFFIXES,
@@ -56,6 +56,7 @@ _FRAME = (
 )
 _LED = ("led", "led_id", "marker", "marker_id", "id")
 _PIXEL = (("x_px", "x", "u_px", "u"), ("y_px", "y", "v_px", "v"))
+_LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"
 _CENTERS = (_FRAME, _LED, *_PIXEL)
 _UNLABELLED = (_FRAME, *_PIXEL)
 _POSE = (
@@ -103,7 +104,7 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     """
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_CENTERS, message("table.of-centers"))
-    table = _with_leds(table, columns)
+    table = _numbered(_with_leds(table, columns), columns[1])
     frame_of_row = table.moments(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = _seen_pixels(table, columns[2:])
@@ -133,6 +134,19 @@ def _with_leds(table: Table, columns: list[int]) -> Table:
         if any(row[column].casefold() not in NOTHING for column in columns[1:])
     ]
     return table.only(named) if named else table
+
+
+def _numbered(table: Table, column: int) -> Table:
+    """Return a table with the numbers of LEDs that are called A, B, C."""
+    letters = [re.fullmatch(_LETTER, row[column]) for row in table.rows]
+    for row, letter in zip(table.rows, letters, strict=True):
+        if all(letters) and letter:
+            row[column] = str(ord(letter[1].upper()) - ord("A") + 1)
+    for i, row in enumerate(table.rows):
+        if row[column] and not re.search(r"\d", row[column]):
+            flaw = message("centers.led-name", cell=quoted(row[column]))
+            raise table.error(i, flaw)
+    return table
 
 
 def read_unlabelled_centers(path: Path) -> UnlabelledCenters:

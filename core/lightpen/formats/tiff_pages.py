@@ -32,24 +32,28 @@ MAX_ENTRIES = 500  # of a directory
 MAX_VALUES = 500_000  # of an entry: strips of one row in three planes, or a palette
 
 _SIGNATURES = {b"II*\0": "<", b"MM\0*": ">", b"II+\0": "<", b"MM\0+": ">"}
-_TYPES = {1: "B", 3: "H", 4: "I", 13: "I", 16: "Q"}
+_TYPES = {1: "B", 3: "H", 4: "I", 13: "I", 16: "Q", 18: "Q"}
 _TEXT = 2
 _KIND, _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _PHOTOMETRIC = 254, 256, 257, 258, 259, 262
 _DESCRIPTION, _STRIPS, _ORIENTATION, _CHANNELS, _STRIP_ROWS = 270, 273, 274, 277, 278
 _STRIP_SIZES, _PLANES, _TILE_WIDTH, _TILE_HEIGHT, _TILES = 279, 284, 322, 323, 324
-_TILE_SIZES, _EXTRA, _FORMAT = 325, 338, 339
+_TILE_SIZES, _SUB_PAGES, _EXTRA, _FORMAT, _SUBSAMPLING = 325, 330, 338, 339, 530
+_STACK = 33629  # of MetaMorph: an entry for each page
 _KEPT = (
     *(_WIDTH, _HEIGHT, _BITS, _COMPRESSION, _PHOTOMETRIC, 266, _CHANNELS, _STRIP_ROWS),
-    *(_PLANES, 317, 320, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _FORMAT),
+    *(_PLANES, 317, 320, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _SUBSAMPLING),
 )
 _READ = frozenset(
-    (*_KEPT, _KIND, _STRIPS, _STRIP_SIZES, _TILES, _TILE_SIZES, _ORIENTATION)
+    (*_KEPT, _KIND, _STRIPS, _STRIP_SIZES, _TILES, _TILE_SIZES, _ORIENTATION, _FORMAT)
 )
-_UNSIGNED = 1  # _FORMAT
+_FORMS = {1: "uint", 2: "int", 3: "float", 4: "uint"}  # _FORMAT
 _REDUCED, _MASK = 1, 4  # bits of _KIND
 _MIN_IS_WHITE, _MIN_IS_BLACK, _MOSAIC = 0, 1, 32803
 _LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
-_NAMES = {6: "JPEG", 7: "JPEG", 34887: "LERC", 34925: "LZMA", 50000: "ZSTD"}
+_NAMES = {
+    **{3: "CCITT fax", 4: "CCITT fax", 6: "JPEG", 7: "JPEG", 34712: "JPEG 2000"},
+    **{34887: "LERC", 34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL"},
+}
 # How ImageJ, beyond 4 GB, and tifffile describe pages that have no directory.
 _STACKS = (
     rb"ImageJ=[^\0]*?\nimages=(\d{1,6})\n",
@@ -123,8 +127,8 @@ class TiffPage:
             raise FileError("image.channels", name=self.name, n_channels=channels)
         if channels == 0 or depth > 64 or width == 0 or height == 0:
             raise damaged_image(self.name)
-        if depth > 16 and self._first(_FORMAT, _UNSIGNED) == _UNSIGNED:  # not by OpenCV
-            kind = f"uint{depth}"
+        kind = f"{_FORMS.get(self._first(_FORMAT, 1), '')}{depth}"
+        if depth > 16 or not kind.startswith("uint"):
             raise FileError("image.value-type", name=self.name, value_type=kind)
         check_pixels(width, height, self.name)
         # It is decoded strip by strip or tile by tile, each from a copy.
@@ -186,15 +190,19 @@ def page_places(stream: BinaryIO, name: _Name) -> list[PagePlace]:
     places: list[PagePlace] = []
     seen: set[int] = set()
     layout = _Layout.read(stream, name)
-    directory = layout.first(stream, name)
-    while directory:
-        if directory in seen or len(seen) == MAX_PAGES:
+    waiting = [layout.first(stream, name)]
+    while waiting:
+        directory = waiting.pop()
+        if directory in seen or len(seen) + len(waiting) >= MAX_PAGES:
             raise damaged_image(name)
         seen.add(directory)
-        tags, following = layout.directory(stream, directory, name, (_KIND,))
+        wanted = (_KIND, _SUB_PAGES)
+        tags, following = layout.directory(stream, directory, name, wanted)
+        waiting += [following] * (following > 0)
         if not tags.get(_KIND, (0,))[0] & (_REDUCED | _MASK):
             places.append(PagePlace(directory))
-        directory = following
+        else:  # of some cameras the image is a page of its preview
+            waiting += tags.get(_SUB_PAGES, ())
     if len(places) == 1:
         return places + _pages_without_directory(stream, name, places[0])
     return places or [PagePlace(min(seen))]
@@ -213,12 +221,10 @@ def _pages_without_directory(
 ) -> list[PagePlace]:
     """Return further pages whose pixels follow those of the only directory."""
     layout = _Layout.read(stream, name)
-    description = layout.text(stream, first.directory, _DESCRIPTION, name)
-    stated = next(filter(None, (re.match(each, description) for each in _STACKS)), None)
+    count = layout.n_stacked(stream, first.directory, name)
     page = read_page(stream, name, first)
-    if stated is None or not page.is_plain:
+    if count == 1 or not page.is_plain:
         return []
-    count = min(int(stated[1]), MAX_PAGES)
     return [PagePlace(first.directory, page.n_bytes * i) for i in range(1, count)]
 
 
@@ -259,13 +265,18 @@ class _Layout:
             tags[tag] = struct.unpack(values, data)
         return tags, following
 
-    def text(self, stream: BinaryIO, place: int, wanted: int, name: _Name) -> bytes:
-        """Return the start of a text of a directory; empty if there is none."""
+    def n_stacked(self, stream: BinaryIO, place: int, name: _Name) -> int:
+        """Return the number of pages that share a directory, as far as it says so."""
+        stated = 1
         entries, _ = self._entries(stream, place, name)
         for tag, kind, count, inline in entries:
-            if tag == wanted and kind == _TEXT:
-                return self._data(stream, inline, min(count, MAX_VALUES), name)
-        return b""
+            if tag == _STACK:
+                stated = count
+            elif tag == _DESCRIPTION and kind == _TEXT:
+                text = self._data(stream, inline, min(count, MAX_VALUES), name)
+                for each in filter(None, (re.match(one, text) for one in _STACKS)):
+                    stated = int(each[1])
+        return min(stated, MAX_PAGES)
 
     def _entries(
         self, stream: BinaryIO, place: int, name: _Name

@@ -70,16 +70,9 @@ def test_a_header_that_ends_early_is_damaged(name: str) -> None:
             header_of(FILES[name][:length])
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(100),  # JPEG 2000
-        b"not an image at all",
-    ],
-)
-def test_a_format_whose_size_is_not_known_here_is_refused(data: bytes) -> None:
+def test_a_format_whose_size_is_not_known_here_is_refused() -> None:
     with pytest.raises(FileError, match="not a supported image"):
-        header_of(data)
+        header_of(b"not an image at all")
 
 
 @pytest.mark.parametrize(
@@ -91,6 +84,13 @@ def test_a_format_whose_size_is_not_known_here_is_refused(data: bytes) -> None:
         (b"SIMPLE  =                    T" + bytes(100), "FITS"),
         (bytes(128) + b"DICM" + bytes(100), "DICOM"),
         (b"LUCAM-RECORDER" + bytes(200), "SER"),
+        (b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(100), "JPEG 2000"),
+        (b"\xff\x4f\xff\x51" + bytes(100), "JPEG 2000"),
+        (b"\xff\x0a" + bytes(100), "JPEG XL"),
+        (b"#?RADIANCE\n" + bytes(100), "HDR"),
+        (b"Pf\n4 4\n-1.0\n" + bytes(64), "PFM"),
+        (b"P7\nWIDTH 4\n" + bytes(64), "PAM"),
+        (b"\x1a\x45\xdf\xa3" + bytes(100), "video"),
     ],
 )
 def test_a_file_of_images_of_another_kind_is_named(data: bytes, kind: str) -> None:
@@ -169,6 +169,15 @@ def test_a_jpeg_in_several_scans_takes_its_coefficients_besides(
     header = header_of(jpeg_head(kind, n_channels, n_scanned))
 
     assert header.working == bytes_a_pixel * 6000 * 4000
+
+
+@pytest.mark.parametrize(("kind", "depth"), [(0xC1, 12), (0xC3, 16), (0xF7, 16)])
+def test_a_jpeg_of_more_than_8_bits_is_named(kind: int, depth: int) -> None:
+    data = bytearray(jpeg_head(kind, 1, 1))
+    data[6] = depth
+
+    with pytest.raises(FileError, match="kind lossless or 12-bit JPEG"):
+        header_of(bytes(data))
 
 
 def test_a_jpeg_of_two_frames_is_refused() -> None:

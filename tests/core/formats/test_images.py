@@ -43,6 +43,8 @@ def folder(tmp_path: Path) -> Path:
         (folder / name).write_bytes(png(GREY))
     (folder / "notes.txt").write_text("no image")
     (folder / "._frame_1.png").write_bytes(b"\0\5\x16\7")  # as macOS leaves behind
+    (folder / ".frame_3.png").write_bytes(png(GREY))  # hidden
+    (folder / "~$frame_4.png").write_bytes(b"open")
     return folder
 
 
@@ -360,6 +362,32 @@ def test_a_pgm_states_the_full_scale_of_its_images(
     source = find_images(str(tmp_path))
     assert source.full_scale == brightest
     assert source.of_bits(12).full_scale == 4095
+
+
+@pytest.mark.parametrize("kind", [2, 3])
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_numbers_of_an_image_in_text_may_end_the_file(
+    tmp_path: Path, kind: int, end: str
+) -> None:
+    values = GREY if kind == 2 else np.repeat(GREY, 3)
+    head = f"P{kind}\n{GREY.shape[1]} {GREY.shape[0]}\n255\n"
+    (tmp_path / "a.ppm").write_text(head + " ".join(map(str, values.flat)) + end)
+
+    (load,) = find_images(str(tmp_path)).open()
+
+    np.testing.assert_array_equal(load(), GREY)
+
+
+@pytest.mark.parametrize("shift", [0, 6])
+def test_stated_bits_may_be_at_either_end_of_a_value(
+    tmp_path: Path, shift: int
+) -> None:
+    deep = GREY.astype(np.uint16) * 4
+    (tmp_path / "a.png").write_bytes(png(deep * np.uint16(2**shift)))
+
+    (load,) = find_images(str(tmp_path)).of_bits(10).open()
+
+    np.testing.assert_array_equal(load(), deep)
 
 
 def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:

@@ -102,6 +102,21 @@ def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
     np.testing.assert_array_equal(found.pixels, [[[1.5, 2.5], nan, [5, 6]]])
 
 
+@pytest.mark.parametrize("name", ["{}", "LED {}", "led_{}"])
+def test_leds_may_be_called_by_letters(tmp_path: Path, name: str) -> None:
+    leds = [name.format(letter) for letter in "CAB"]
+    rows = [f"7,{led},{x},2" for led, x in zip(leds, (3, 1, 2), strict=True)]
+
+    found = read_centers(saved(tmp_path, HEADER, *rows), 3)
+
+    np.testing.assert_array_equal(found.pixels[0, :, 0], [1, 2, 3])
+
+
+def test_names_of_leds_without_order_are_refused(tmp_path: Path) -> None:
+    refusal = refusal_of_centers(tmp_path, HEADER, "7,A,1,2", "7,front left,3,4")
+    assert "Number the LEDs" in refusal
+
+
 def test_shares_of_an_image_are_no_pixels(tmp_path: Path) -> None:
     rows = [f"{n},1,{0.4 + n / 100},0.5" for n in range(30)]
     assert "shares of the image" in refusal_of_centers(tmp_path, HEADER, *rows)

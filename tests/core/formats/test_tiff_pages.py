@@ -141,6 +141,43 @@ def test_pages_without_directory_are_read(tmp_path: Path, description: bytes) ->
     np.testing.assert_array_equal(images, stack)
 
 
+def test_the_pages_of_metamorph_are_counted_by_its_own_tag(tmp_path: Path) -> None:
+    stack = np.stack([DEEP, DEEP[::-1], DEEP[:, ::-1]])
+    tags, _ = page(DEEP)
+    data = bytearray(tiff((tags | {33629: [0] * 3}, [stack.tobytes()])))
+    at = data.index(struct.pack("<HHI", 279, 4, 1))
+    struct.pack_into("<I", data, at + 8, DEEP.nbytes)
+
+    _, images = images_of(bytes(data), tmp_path)
+
+    np.testing.assert_array_equal(images, stack)
+
+
+def test_an_image_may_be_a_page_of_its_preview(tmp_path: Path) -> None:
+    data = bytearray(tiff(page(GREY[::3, ::3], t254=1, t330=1), page(DEEP)))
+    link = data.index(struct.pack("<HHI", 330, 4, 1)) + 8
+    first = struct.unpack_from("<I", data, 4)[0]
+    (count,) = struct.unpack_from("<H", data, first)
+    following = first + 2 + 12 * count
+    data[link : link + 4] = data[following : following + 4]
+    data[following : following + 4] = bytes(4)
+
+    names, images = images_of(bytes(data), tmp_path)
+
+    assert names == ("swing.tif",)
+    np.testing.assert_array_equal(images[0], DEEP)
+
+
+def test_colours_of_video_that_are_not_subsampled_are_read() -> None:
+    planes = np.stack([GREY, np.full_like(GREY, 128), np.full_like(GREY, 128)], axis=-1)
+    tags, _ = page(GREY, t262=6)
+    tags |= {258: [8, 8, 8], 277: [3], 530: [1, 1]}
+
+    decoded = decode_image(tiff((tags, [planes.tobytes()])), "video")
+
+    assert np.abs(decoded.astype(int) - GREY).max() <= 1
+
+
 @pytest.mark.parametrize("image", [GREY, DEEP])
 def test_white_may_be_zero(image: Image) -> None:
     decoded = decode_image(tiff(page(~image, t262=0)), "white")
