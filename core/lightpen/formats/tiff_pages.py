@@ -50,10 +50,9 @@ _FORMS = {1: "uint", 2: "int", 3: "float", 4: "uint"}  # _FORMAT
 _REDUCED, _MASK = 1, 4  # bits of _KIND
 _MIN_IS_WHITE, _MIN_IS_BLACK, _MOSAIC = 0, 1, 32803
 _LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
-_NAMES = {
-    **{3: "CCITT fax", 4: "CCITT fax", 6: "JPEG", 7: "JPEG", 34712: "JPEG 2000"},
-    **{34887: "LERC", 34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL"},
-}
+_NAMES = dict.fromkeys((6, 7), "JPEG") | dict.fromkeys((3, 4), "CCITT fax")
+_NAMES |= {34712: "JPEG 2000", 34887: "LERC", 34925: "LZMA"}
+_NAMES |= {50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL"}
 # How ImageJ, beyond 4 GB, and tifffile describe pages that have no directory.
 _STACKS = (
     rb"ImageJ=[^\0]*?\nimages=(\d{1,6})\n",

@@ -5968,6 +5968,10 @@
         <translation>{address} 不是本机的地址。请给出本机在客户端网络中的地址；仅限本机时用 {loopback}。</translation>
     </message>
     <message>
+        <source>{cell} is no number of an LED. Number the LEDs in the order of the LED file, from 1.</source>
+        <translation>{cell} 不是 LED 编号。请按 LED 文件中的顺序从 1 开始给 LED 编号。</translation>
+    </message>
+    <message>
         <source>{cell} is no number or time of a frame: up to 19 digits, 9 of them behind the decimal point.</source>
         <translation>{cell} 不是帧的编号或时间：最多 19 位数字，其中小数点后 9 位。</translation>
     </message>
