@@ -79,7 +79,7 @@ class OptionsMenu(Translated, QMenu):
         self._data_folder.triggered.connect(self.ask_data_folder)
         self._about.triggered.connect(self._show_about)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> Preferences:
         """Return the preferences in use."""
@@ -101,7 +101,7 @@ class OptionsMenu(Translated, QMenu):
         action.triggered.connect(lambda: entry.choose(window))
         self.insertAction(self._about, action)
         self._entries.append((action, entry))
-        self._retranslate()
+        self._refresh()
 
     def _on_data_folder_chosen(self, folder: str) -> None:
         self._choose(data_folder=folder)
@@ -156,7 +156,7 @@ class OptionsMenu(Translated, QMenu):
                 return own_name(value)
         return self.tr("{0} m").format(f"{value:g}")
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         for action, entry in self._entries:
             action.setText(entry.text())
         for action, value in self._choices:

@@ -106,7 +106,7 @@ class StepButton(Translated, PushButton):
         self.setFlat(True)
         self.setIconSize(QSize(SIDE, SIDE))
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leads to the page
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> Step:
         """Return the step shown."""
@@ -116,10 +116,10 @@ class StepButton(Translated, PushButton):
         """Show another state of the step."""
         if step != self._step:
             self._step = step
-            self._retranslate()
+            self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         words = {
             StepState.DONE: self.tr("done"),
             StepState.DOUBTFUL: self.tr("done, check needed"),
@@ -323,13 +323,13 @@ class Sidebar(Translated, QFrame):
         self._layout.setContentsMargins(0, top, 0, bottom)
         self._name.setVisible(not room.is_low)  # the title of the window shows it
         self._steps.set_narrow(narrow)
-        self._retranslate()
+        self._refresh()
 
     def options_corner(self) -> QPoint:
         """Return the screen position of the top left of the options button."""
         return self._options.mapToGlobal(QPoint(0, 0))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._show_subject()
         for button, text, key in (
             (self._operator_view, self.tr("Operator view"), "F11"),

@@ -117,7 +117,7 @@ class QuestionBar(Translated, AskingBar):
         """Return the question; empty while nothing is asked."""
         return "" if self.isHidden() else self._text.text()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.refresh()
 
     def _on_agree_clicked(self) -> None:
@@ -187,14 +187,14 @@ class ReasonBar(AskingBar):
         layout.setColumnStretch(0, 1)
 
         # Connections
-        self._edit.textChanged.connect(self._refresh)
-        self._supervisor.value_edited.connect(self._refresh)
+        self._edit.textChanged.connect(self._check_reason)
+        self._supervisor.value_edited.connect(self._check_reason)
         self._supervisor.entered.connect(self._on_given)
         self._edit.returnPressed.connect(self._on_given)
         self._give.clicked.connect(self._on_given)
         self._decline.clicked.connect(self._on_declined)
 
-        self._refresh()
+        self._check_reason()
         self.hide()
 
     @override
@@ -230,7 +230,7 @@ class ReasonBar(AskingBar):
         self._edit.setPlaceholderText(field)
         self._give.setText(yes)
         self._decline.setText(no)
-        self._refresh()
+        self._check_reason()
 
     def ask(self, *, of_supervisor: bool = False) -> None:
         """Ask and wait for a text, signed by a supervisor if required."""
@@ -260,7 +260,7 @@ class ReasonBar(AskingBar):
         is_given = bool(self._reason()) and n_letters(self._reason()) >= self._least
         return is_given and (self._supervisor.is_filled() or not is_asked)
 
-    def _refresh(self) -> None:
+    def _check_reason(self) -> None:
         self._give.setEnabled(self._is_whole())
         n_typed = n_letters(self._reason())
         self._too_short.setVisible(bool(self._reason()) and n_typed < self._least)
@@ -288,9 +288,9 @@ class WithdrawalBar(Translated, ReasonBar):
 
     def __init__(self) -> None:
         super().__init__()
-        self._retranslate()
+        self._refresh()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.set_words(
             self.tr(
                 "Revoke this acceptance? The previous result becomes current again. "

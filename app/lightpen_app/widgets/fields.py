@@ -219,12 +219,12 @@ class Translated(WidgetMixin):
     """Mixin before the base of a widget: its texts follow the language.
 
     `say`, `say_items`, `make_button` and `make_field` give a fixed text. What depends
-    on more is set by `_retranslate`.
+    on more is set by `_refresh`.
     """
 
     _words_said: dict[tuple[Named | None, str | int], Text]
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         """Set the texts that depend on what is shown."""
 
     @override
@@ -320,7 +320,7 @@ class Translated(WidgetMixin):
         if event.type() == QEvent.Type.LanguageChange:
             for (of, part), words in self.__dict__.get("_words_said", {}).items():
                 _set(self if of is None else of, part, words.again())
-            self._retranslate()
+            self._refresh()
 
 
 def _set(of: Named, part: str | int, words: str) -> None:

@@ -69,7 +69,7 @@ class ImageView(Translated, QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
-        self._retranslate()
+        self._refresh()
 
     def set_half(
         self, half: Image, size: QSize, markers: Sequence[Marker] = ()
@@ -93,7 +93,7 @@ class ImageView(Translated, QWidget):
     def set_message(self, text: str) -> None:
         """Say why there is no image; shown in its place."""
         self._message = text
-        self._retranslate()
+        self._refresh()
         self.update()
 
     def image_size(self) -> QSize:
@@ -109,10 +109,6 @@ class ImageView(Translated, QWidget):
         """Return the position of an image point on the widget."""
         target, scale = self._target()
         return target.topLeft() + QPointF(x + 0.5, y + 0.5) * scale
-
-    def zoom(self) -> float:
-        """Return the enlargement; 1 shows the whole image."""
-        return self._zoom
 
     def set_zoom(self, zoom: float, about: QPointF | None = None) -> None:
         """Zoom about a fixed point of the widget."""
@@ -260,7 +256,7 @@ class ImageView(Translated, QWidget):
         self._dragged = None
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.setAccessibleDescription(self._message if self._shown.isNull() else "")
 
     def _show(
@@ -272,7 +268,7 @@ class ImageView(Translated, QWidget):
         self._markers = markers
         self._shown = QImage() if half is None else _as_qimage(half)
         if was_empty is not (half is None):
-            self._retranslate()
+            self._refresh()
         self.update()
 
     def _target(self) -> tuple[QRectF, float]:

@@ -97,7 +97,7 @@ class CameraSwitch(Translated, QWidget):
         # Connections
         self._group.idClicked.connect(self.value_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> int:
         """Return the number of the camera that is shown, from 0."""
@@ -107,6 +107,6 @@ class CameraSwitch(Translated, QWidget):
         """Show another camera as chosen."""
         self._buttons[camera].setChecked(True)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         for number, button in enumerate(self._buttons, start=1):
             button.setText(self.tr("Camera {0}").format(number))

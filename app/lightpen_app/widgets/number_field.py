@@ -54,17 +54,9 @@ class NumberField(LeavesPageKeys, QLineEdit):
         if not (is_same and self.hasFocus() and self.isModified()):
             self._show()
 
-    def limits(self) -> tuple[float, float]:
-        """Return the least and the largest number that are accepted."""
-        return self._limits
-
     def set_limits(self, least: float, largest: float) -> None:
         """Accept other numbers; the present one stays."""
         self._limits = (least, largest)
-
-    def unit(self) -> str:
-        """Return the unit."""
-        return self._unit
 
     def set_unit(self, unit: str) -> None:
         """Show another unit; an unchanged one keeps the text being typed."""

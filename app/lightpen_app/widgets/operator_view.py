@@ -93,7 +93,7 @@ class OperatorView(Translated, QWidget):
         layout.setRowStretch(2, 1)
         layout.setColumnStretch(1, SIDE_SHARE)
 
-        self._retranslate()
+        self._refresh()
         self._resize_letters()
 
     def value(self) -> OperatorValue:
@@ -196,7 +196,7 @@ class OperatorView(Translated, QWidget):
             room = round(self.height() * share)
             widget.setFixedHeight(min(widget.sizeHint().height(), room))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._show_keys()
 
     def _show_keys(self) -> None:

@@ -127,5 +127,5 @@ class Page(Translated, QWidget):
         """Cancel jobs, stop threads, close cameras: the window closes."""
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         """Translate every text; by default there is none."""

@@ -82,7 +82,7 @@ class PenView(Translated, QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> PenPicture:
         """Return the value."""
@@ -97,21 +97,13 @@ class PenView(Translated, QWidget):
         if pen is not None and np.abs(pen.leds).max(initial=0.0) > MAX_COORDINATE:
             value = PenPicture()
         self._value = value
-        self._retranslate()
-
-    def chosen(self) -> int:
-        """Return the number of the LED that is picked out, 0 for none."""
-        return self._chosen
+        self._refresh()
 
     def set_chosen(self, led: int) -> None:
         """Pick out another LED."""
         if led != self._chosen:
             self._chosen = led
             self.update()
-
-    def turned(self) -> tuple[float, float]:
-        """Return the rotation about the pen's y axis and towards the viewer, rad."""
-        return self._yaw, self._pitch
 
     def place_of(self, led: int) -> QPointF:
         """Return the position of the LED of a number."""
@@ -304,7 +296,7 @@ class PenView(Translated, QWidget):
         self.update()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.update()
         pen = self._value.pen
         n_leds = 0 if pen is None else pen.n_leds

@@ -165,15 +165,6 @@ class Plot(Figure):
 
         self.set_axes(axes)
 
-    def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return least and greatest x, and least and greatest y, that are shown."""
-        (left, right), (low, high) = self._item.viewRange()
-        return (left, right), (low, high)
-
-    def n_items(self) -> int:
-        """Return the number of plot items."""
-        return len(self._item.items)
-
     @override
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)

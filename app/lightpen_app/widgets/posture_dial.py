@@ -130,7 +130,7 @@ class PostureDial(Translated, QWidget):
         return round(width + self._bar_height(width))
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._describe()
 
     def _describe(self) -> None:

@@ -111,12 +111,6 @@ class ArrowPlot(SquarePlot):
             pg.ScatterPlotItem(pos=points, size=6, pen=None, brush=brush)
         )
 
-    def lines(self) -> tuple[FloatArray, FloatArray]:
-        """Return the ends x (6 N,), y (6 N,) of shafts and heads, in pairs."""
-        assert self._shafts is not None
-        x, y = self._shafts.getData()
-        return x, y
-
     @override
     def _restyle(self) -> None:
         super()._restyle()

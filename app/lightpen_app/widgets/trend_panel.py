@@ -64,11 +64,6 @@ class TrendPlot(Plot):
         else:
             self._ring.setData([float(number)], [float(values[number - 1])])
 
-    def marked(self) -> int | None:
-        """Return the number of the calibration with the ring."""
-        x, _ = self._ring.getData()
-        return int(x[0]) if len(x) else None
-
     @override
     def _restyle(self) -> None:
         super()._restyle()
@@ -109,7 +104,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         )
         self._grid = grid_layout(layout, stretch=1)
 
-        self._retranslate()
+        self._refresh()
 
     def plots(self) -> tuple[TrendPlot, ...]:
         """Return the plots of x, y, z and U; empty without a trend."""
@@ -166,7 +161,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         for i, plot in enumerate(self._plots):
             self._grid.addWidget(plot, *divmod(i, n_columns))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._text.setText(self._text_of(self._value))
 
     def _text_of(self, trend: Trend) -> str:

@@ -115,7 +115,7 @@ class BoardForm(Translated, QWidget):
             number.value_changed.connect(self._on_changed)
 
         self.set_board(USUAL[BoardKind.CHESSBOARD])
-        self._retranslate()
+        self._refresh()
 
     def board(self) -> Board:
         """Return the board of the fields, or raise `UsageError`."""
@@ -153,11 +153,11 @@ class BoardForm(Translated, QWidget):
         self.set_board(USUAL[kind])
 
     def _on_changed(self) -> None:
-        self._retranslate()
+        self._refresh()
         self.changed.emit()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         kind = BoardKind(self._kind.currentData())
         names = {
             BoardKind.CHESSBOARD: self.tr("Chessboard"),

@@ -119,23 +119,23 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
         # Connections
         live.image_shown.connect(self._on_image_shown)
-        self._capture.changed.connect(self._refresh)
-        self._calibration.remark_changed.connect(self._refresh)
+        self._capture.changed.connect(self._show_state)
+        self._calibration.remark_changed.connect(self._show_state)
         self._calibration.found_changed.connect(self._on_found_changed)
         self._calibration.begun.connect(self._progress.begin)
-        self._calibration.begun.connect(self._refresh)
+        self._calibration.begun.connect(self._show_state)
         self._calibration.progressed.connect(self._progress.set_fraction)
         self._calibration.ended.connect(self._progress.end)
-        self._calibration.ended.connect(self._refresh)
+        self._calibration.ended.connect(self._show_state)
         self._progress.cancelled.connect(self._calibration.cancel)
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
         self._begin.clicked.connect(self._on_begin_clicked)
         self._compute.clicked.connect(self._calibration.calibrate_by_capture)
-        self._worst.currentRowChanged.connect(self._refresh)
-        self._shows_residuals.toggled.connect(self._refresh)
+        self._worst.currentRowChanged.connect(self._show_state)
+        self._shows_residuals.toggled.connect(self._show_state)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -211,7 +211,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
                 blank = np.zeros((height // 2, width // 2), np.uint8)
                 self._image.set_half(blank, QSize(width, height))
         self._list_views()
-        self._refresh()
+        self._show_state()
 
     def _list_views(self) -> None:
         found, chosen = self._calibration.found, self._worst.currentRow()
@@ -229,11 +229,11 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._worst.addItem(item)
         self._worst.setCurrentRow(chosen)
 
-    def _retranslate(self) -> None:
-        self._list_views()
-        self._refresh()
-
     def _refresh(self) -> None:
+        self._list_views()
+        self._show_state()
+
+    def _show_state(self) -> None:
         state, found = self._capture.state, self._calibration.found
         is_live = state.sought is not None
         self._begin.setText(self.tr("Stop") if is_live else self.tr("Start"))

@@ -76,7 +76,7 @@ class MonteCarloRow(Translated, BudgetRow):
         # Connections
         self._progress.cancelled.connect(self._on_cancel_clicked)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def set_value(self, solution: Solution) -> None:
@@ -123,10 +123,6 @@ class MonteCarloRow(Translated, BudgetRow):
         self.stop()
         self._refresh()
         give_focus(self._start)
-
-    @override
-    def _retranslate(self) -> None:
-        self._refresh()
 
     def _refresh(self) -> None:
         is_busy = self._job.is_running

@@ -80,7 +80,7 @@ class SelectionPanel(ResponsiveLayout, Translated, SelectionTab):
         horizontal_layout(layout, self._report, 1)
         layout.addStretch(1)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def _use_room(self) -> None:
@@ -95,7 +95,7 @@ class SelectionPanel(ResponsiveLayout, Translated, SelectionTab):
         self._selected = tuple(filter(has_tip, selected))
         self._trend = trend
         self._limits = self._workbench.selection.limits.verification
-        self._retranslate()
+        self._refresh()
 
     def comparison(self) -> Comparison | None:
         """Return the comparison; None unless two tips are selected."""
@@ -125,7 +125,7 @@ class SelectionPanel(ResponsiveLayout, Translated, SelectionTab):
         job = Job(keep, self)
         job.start(self.verification_kept, lambda why: notify(self, why))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._show_comparison(self.comparison())
         self._show_repeatability(self.repeatability())
 

@@ -116,17 +116,17 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
         # Connections
         workbench.live.image_shown.connect(self._on_image_shown)
-        self._run.changed.connect(self._refresh)
+        self._run.changed.connect(self._show_state)
         self._run.found_changed.connect(self._show_found)
         self._run.saved.connect(self._on_saved)
         self._compute.clicked.connect(self._on_compute_clicked)
         self._progress.cancelled.connect(self._run.cancel)
         self._save.clicked.connect(self._run.save)
         for edit in fields:
-            edit.textEdited.connect(self._refresh)
-            edit.value_changed.connect(self._refresh)
+            edit.textEdited.connect(self._show_state)
+            edit.value_changed.connect(self._show_state)
 
-        self._retranslate()
+        self._refresh()
 
     def set_camera_known(self, is_known: bool) -> None:
         """Take the selected camera file as known, or find the camera as well."""
@@ -152,12 +152,12 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self.continued.emit()
         self.close()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._image.set_message(self.tr("No image"))
         self._length.set_empty_text(self.tr("Not specified"))
         self._show_found()
 
-    def _refresh(self) -> None:
+    def _show_state(self) -> None:
         state = self._run.state
         self._begin.setEnabled(not state.is_capturing)
         self._stop.setEnabled(state.is_capturing)
@@ -196,7 +196,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             overlay = BoardOverlay(uncertainty=by_image)
             self._image.set_markers(())
         self._image.set_overlay(overlay)
-        self._refresh()
+        self._show_state()
 
     def _instructed(self, state: DiscoveryState) -> StatusMessage:
         if state.progress is not None:

@@ -229,7 +229,7 @@ class MeasurePage(ProbingPage):
         self._progress.add_button(self._plan.of_part)
 
         self._on_workbench_changed()
-        self._retranslate()
+        self._refresh()
 
     @override
     def title(self) -> str:

@@ -98,7 +98,7 @@ class PlanPanel(Translated, QWidget):
         self._question.agreed.connect(self._leave_plan)
         self._kind.activated.connect(self._on_kind_chosen)
 
-        self._retranslate()
+        self._refresh()
 
     def set_status(self, status: VerificationStatus, *, lacks_plan: bool) -> None:
         """Show a measurement."""
@@ -129,7 +129,7 @@ class PlanPanel(Translated, QWidget):
         return None if found is None else found.part
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))

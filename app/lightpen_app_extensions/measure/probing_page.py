@@ -185,7 +185,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._showing.stop()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._image.set_message(self.tr("No image yet"))
         self._show()
 

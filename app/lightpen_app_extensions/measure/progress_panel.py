@@ -91,7 +91,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._print_report.failed.connect(partial(workbench.notifications.notify, self))
         self._print_report.saved.connect(self._on_saved)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, view: VerifyView) -> None:
         """Show another snapshot of the verification."""

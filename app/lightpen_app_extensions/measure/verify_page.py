@@ -65,7 +65,7 @@ class PenPanel(Translated, QWidget):
         # Connections
         workbench.selection.changed.connect(self._on_workbench_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def shut_down(self) -> None:
         """Cancel the running job."""
@@ -87,10 +87,6 @@ class PenPanel(Translated, QWidget):
         if now.pen_file is not None:
             work = partial(read_pen_over_time, archive, now)
             self._reading.start(work, self._on_read, self._on_unread)
-        self._refresh()
-
-    @override
-    def _retranslate(self) -> None:
         self._refresh()
 
     def _on_workbench_changed(self) -> None:
@@ -217,7 +213,7 @@ class VerifyPage(ProbingPage):
         self._pen.changed.connect(self._on_pen_read)
 
         self._on_workbench_changed()
-        self._retranslate()
+        self._refresh()
 
     @override
     def title(self) -> str:

@@ -119,7 +119,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self.saved.connect(self._on_saved)
         self.failed.connect(self._on_failed)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -131,7 +131,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         """Return the number of pages."""
         return self._pages.pageCount()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.setWindowTitle(self._report.margins.title)
 
     def _ask_file(self) -> None:

@@ -83,7 +83,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
     @override
     def _use_room(self) -> None:
-        self._retranslate()
+        self._refresh()
 
     @override
     def invite(self) -> None:
@@ -99,7 +99,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         return self._follow.isChecked()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._follow.setText(
             self.tr("Simulated swing")
             if self._room.is_narrow

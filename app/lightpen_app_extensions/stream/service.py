@@ -126,10 +126,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._refresh()
         self.value_changed.emit(is_on, self.place())
 
-    @override
-    def _retranslate(self) -> None:
-        self._refresh()
-
 
 class Streaming(QObject):
     """Opens and closes the stream and updates its tip.

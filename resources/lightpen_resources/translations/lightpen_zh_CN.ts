@@ -28,17 +28,6 @@
     </message>
 </context>
 <context>
-    <name>ArchiveControl</name>
-    <message>
-        <source>{0} entries saved in {1}</source>
-        <translation>{0} 个条目已保存到 {1}</translation>
-    </message>
-    <message>
-        <source>Save entries</source>
-        <translation>保存条目</translation>
-    </message>
-</context>
-<context>
     <name>ArchivePanel</name>
     <message>
         <source>Check the archive</source>
@@ -55,6 +44,14 @@
     <message>
         <source>Save listed entries (CSV)...</source>
         <translation>保存所列条目 (CSV)...</translation>
+    </message>
+    <message>
+        <source>Save entries</source>
+        <translation>保存条目</translation>
+    </message>
+    <message>
+        <source>{0} entries saved in {1}</source>
+        <translation>{0} 个条目已保存到 {1}</translation>
     </message>
     <message>
         <source>For other programs</source>
@@ -1131,37 +1128,6 @@
     </message>
 </context>
 <context>
-    <name>HistoryContent</name>
-    <message>
-        <source>Trend</source>
-        <translation>趋势</translation>
-    </message>
-    <message>
-        <source>Entry</source>
-        <translation>条目</translation>
-    </message>
-    <message>
-        <source>Due</source>
-        <translation>到期</translation>
-    </message>
-    <message>
-        <source>Archive</source>
-        <translation>档案库</translation>
-    </message>
-    <message>
-        <source>{0} entries</source>
-        <translation>{0} 个条目</translation>
-    </message>
-    <message>
-        <source>1 entry</source>
-        <translation>1 条记录</translation>
-    </message>
-    <message>
-        <source>Saved in {0}</source>
-        <translation>已保存到 {0}</translation>
-    </message>
-</context>
-<context>
     <name>HistoryModel</name>
     <message>
         <source>When</source>
@@ -1219,12 +1185,40 @@
         <translation>历史</translation>
     </message>
     <message>
+        <source>Trend</source>
+        <translation>趋势</translation>
+    </message>
+    <message>
+        <source>Entry</source>
+        <translation>条目</translation>
+    </message>
+    <message>
+        <source>Due</source>
+        <translation>到期</translation>
+    </message>
+    <message>
+        <source>Archive</source>
+        <translation>档案库</translation>
+    </message>
+    <message>
         <source>Complete, tamper-evident history of every tip</source>
         <translation>每个测头的完整历史，任何篡改均可察觉</translation>
     </message>
     <message>
         <source>Next calibration</source>
         <translation>下一次标定</translation>
+    </message>
+    <message>
+        <source>1 entry</source>
+        <translation>1 条记录</translation>
+    </message>
+    <message>
+        <source>{0} entries</source>
+        <translation>{0} 个条目</translation>
+    </message>
+    <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
     </message>
 </context>
 <context>
@@ -3148,21 +3142,6 @@
     </message>
 </context>
 <context>
-    <name>ResultExport</name>
-    <message>
-        <source>Tip copied: x, y, z in mm.</source>
-        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
-    </message>
-    <message>
-        <source>Folder for saving</source>
-        <translation>保存到的文件夹</translation>
-    </message>
-    <message>
-        <source>Saved in {0}</source>
-        <translation>已保存到 {0}</translation>
-    </message>
-</context>
-<context>
     <name>ResultPanel</name>
     <message>
         <source>The tip beside others</source>
@@ -3254,6 +3233,18 @@
     <message>
         <source>Record and tables</source>
         <translation>记录和表格</translation>
+    </message>
+    <message>
+        <source>Tip copied: x, y, z in mm.</source>
+        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
+    </message>
+    <message>
+        <source>Folder for saving</source>
+        <translation>保存到的文件夹</translation>
+    </message>
+    <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
     </message>
     <message>
         <source>Copy tip</source>

@@ -50,32 +50,32 @@ def test_up_is_y_and_right_is_x(view: PenView) -> None:
 
 
 def test_the_arrow_keys_turn_it_and_0_puts_it_back(view: PenView) -> None:
-    start, at_first = picture(view), view.turned()
+    start, at_first = picture(view), view.place_of(7)
     press(view, Qt.Key.Key_Left)
     press(view, Qt.Key.Key_Up)
 
-    assert view.turned() != at_first
     assert picture(view) != start
 
     press(view, Qt.Key.Key_0)
 
-    assert view.turned() == at_first
+    assert view.place_of(7) == at_first
 
 
 def test_dragging_turns_it(view: PenView) -> None:
-    yaw, pitch = view.turned()
+    yaw, pitch = view._yaw, view._pitch
     QTest.mousePress(view, LEFT, pos=QPoint(100, 100))
     QTest.mouseMove(view, QPoint(140, 80))
     QTest.mouseRelease(view, LEFT, pos=QPoint(140, 80))
 
-    assert view.turned() == pytest.approx((yaw + 0.349, pitch - 0.175), abs=1e-3)
+    turned = view._yaw - yaw, view._pitch - pitch
+    assert turned == pytest.approx((0.349, -0.175), abs=1e-3)
 
 
 def test_it_cannot_be_turned_over(view: PenView) -> None:
     for _ in range(40):
         press(view, Qt.Key.Key_Down)
 
-    assert view.turned()[1] < np.pi / 2
+    assert view._pitch < np.pi / 2
 
 
 def test_a_click_on_an_led_chooses_it(view: PenView, qtbot: QtBot) -> None:

@@ -8,7 +8,7 @@ from PySide6.QtGui import QFontMetricsF, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
-from tests.app.pictures import colors_in, data_of
+from tests.app.pictures import colors_in, data_of, items_on, ranges_of
 
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.figures import arrow_scale, budget_figure
@@ -55,7 +55,7 @@ def test_the_range_holds_all_data_the_zero_and_the_limit(trace: TracePlot) -> No
     trace.set_limit(0.2)
     trace.set_data(IMAGES, VALUES)
 
-    (left, right), (bottom, top) = trace.ranges()
+    (left, right), (bottom, top) = ranges_of(trace)
 
     assert left <= 1
     assert right >= 5
@@ -64,12 +64,12 @@ def test_the_range_holds_all_data_the_zero_and_the_limit(trace: TracePlot) -> No
 
 
 def test_new_data_draws_on_the_same_curve(trace: TracePlot) -> None:
-    n_items = trace.n_items()
+    n_items = len(items_on(trace))
 
     for n in range(1, 50):
         trace.set_data(np.arange(n, dtype=float), np.ones(n))
 
-    assert trace.n_items() == n_items
+    assert len(items_on(trace)) == n_items
 
 
 def test_one_value_or_none_is_no_fault(trace: TracePlot) -> None:
@@ -100,7 +100,7 @@ def test_arrows_point_along_the_residuals_with_v_downwards(qtbot: QtBot) -> None
 
     plot.set_data((2448, 2048), points, residuals)
 
-    x, y = plot.lines()
+    x, y = data_of(plot, pg.PlotCurveItem)
     scale = plot.scale()
     assert (x[0], y[0], x[1], y[1]) == (1000, 500, 1000 + 0.05 * scale, 500)
     assert (x[6], y[6], x[7], y[7]) == (600, 1500, 600, 1500 - 0.1 * scale)
@@ -117,7 +117,7 @@ def test_the_place_of_the_leds_stays_in_sight_when_the_plot_is_resized(
     plot.resize(700, 300)
     QApplication.processEvents()
 
-    (left, right), (top, bottom) = plot.ranges()
+    (left, right), (top, bottom) = ranges_of(plot)
     assert left <= 600
     assert right >= 1000
     assert top <= 500
@@ -133,7 +133,7 @@ def test_of_many_arrows_the_means_are_drawn(qtbot: QtBot) -> None:
 
     plot.set_data((2448, 2048), points, pattern + rng.normal(0, 0.05, (3000, 2)))
 
-    x, y = plot.lines()
+    x, y = data_of(plot, pg.PlotCurveItem)
     assert 300 < len(x) / 6 <= 21 * 21
     shafts = np.column_stack([x[1::6] - x[0::6], y[1::6] - y[0::6]]) / plot.scale()
     np.testing.assert_allclose(shafts.mean(axis=0), pattern, atol=0.005)
@@ -159,12 +159,12 @@ def misfits(qtbot: QtBot) -> MisfitPlot:
 
 
 def test_images_far_off_leave_the_others_apart(misfits: MisfitPlot) -> None:
-    (_, _), (bottom, top) = misfits.ranges()
+    (_, _), (bottom, top) = ranges_of(misfits)
 
     assert bottom == pytest.approx(0, abs=0.01)
     assert top < 0.2
-    assert misfits.place_of(2) == (2, 0.06)
-    assert misfits.place_of(4)[1] < top
+    assert data_of(misfits, pg.ScatterPlotItem, 1)[:, 1].tolist() == [2, 0.06]
+    assert data_of(misfits, pg.ScatterPlotItem, 2)[1, 0] < top
 
 
 def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> None:
@@ -172,16 +172,16 @@ def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> Non
 
     misfits.set_data(np.array([1, 2]), np.array([0.1, 0.2]), np.array([True, False]))
 
-    assert misfits.number() == 2
+    assert data_of(misfits, pg.ScatterPlotItem).T.tolist() == [[2, 0.2]]
     misfits.set_number(None)
-    assert misfits.number() is None
+    assert data_of(misfits, pg.ScatterPlotItem).size == 0
 
 
 def test_a_click_on_a_dot_chooses_its_image(misfits: MisfitPlot, qtbot: QtBot) -> None:
     (canvas,) = misfits.findChildren(Canvas)
     canvas.fit()
     view = canvas.getPlotItem().vb
-    scene = view.mapViewToScene(QPointF(*misfits.place_of(2)))
+    scene = view.mapViewToScene(QPointF(2, 0.06))
     place = canvas.mapFromScene(scene)
 
     with qtbot.waitSignal(misfits.number_chosen) as chosen:
@@ -201,7 +201,7 @@ def test_bars_stand_at_their_labels(qtbot: QtBot) -> None:
 
     plot.set_data(["1", "2"], np.array([0.05, np.nan]), np.array([-0.01, 0.01]))
 
-    (left, right), (bottom, top) = plot.ranges()
+    (left, right), (bottom, top) = ranges_of(plot)
     assert left <= -0.4
     assert right >= 1.4
     assert bottom <= -0.01
@@ -293,7 +293,7 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
     dots = data_of(plot, pg.ScatterPlotItem)
     np.testing.assert_allclose(dots, [[10, 0], [0, 20]], atol=1e-9)
-    (left, right), (bottom, top) = plot.ranges()
+    (left, right), (bottom, top) = ranges_of(plot)
     assert left <= -36
     assert right >= 36
     assert bottom <= -36
@@ -305,13 +305,13 @@ def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
     lines = MarkPlot(Axes("Tip"), ("x",))
     for plot in (bars, lines):
         show(qtbot, plot)
-    before = bars.n_items(), lines.n_items()
+    before = len(items_on(bars)), len(items_on(lines))
 
     for n in range(2, 30):
         bars.set_data([str(i) for i in range(n)], np.ones(n))
         lines.set_data(np.arange(float(n)), np.ones(n))
 
-    assert (bars.n_items(), lines.n_items()) == before
+    assert (len(items_on(bars)), len(items_on(lines))) == before
 
 
 def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:

@@ -7,6 +7,7 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtGui import QImage, QPainter
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import ranges_of
 
 from lightpen_app.look.theme import TextSize, font
 from lightpen_app.widgets.figure import Axes
@@ -29,7 +30,7 @@ def test_decades_are_drawn_by_their_logarithm(decades: TracePlot) -> None:
     values = np.array([np.nan, 0.0, 1000.0, 10.0, 1.0])
     decades.set_data(np.arange(1.0, 6.0), values)
 
-    (_, _), (low, high) = decades.ranges()
+    (_, _), (low, high) = ranges_of(decades)
 
     assert -0.5 < low <= 0
     assert 3 <= high < 3.5
@@ -39,7 +40,7 @@ def test_a_limit_is_in_sight(decades: TracePlot) -> None:
     decades.set_limit(50.0)
     decades.set_data(np.arange(1.0, 4.0), np.array([4.0, 2.0, 1.0]))
 
-    (_, _), (_, high) = decades.ranges()
+    (_, _), (_, high) = ranges_of(decades)
 
     assert high > np.log10(50.0)
 
@@ -49,7 +50,7 @@ def test_the_first_values_do_not_hide_the_others(qtbot: QtBot) -> None:
     values = np.where(np.arange(40) < 8, 5000.0, 0.5 * np.cos(np.arange(40)))
     plot.set_data(np.arange(1.0, 41.0), values)
 
-    (left, _), (_, high) = plot.ranges()
+    (left, _), (_, high) = ranges_of(plot)
 
     assert left <= 1
     assert high < 2
@@ -60,7 +61,7 @@ def test_the_newest_value_is_in_sight_however_far_off_it_is(qtbot: QtBot) -> Non
     values = np.where(np.arange(40) < 38, np.cos(np.arange(40)), 5000.0)
     plot.set_data(np.arange(1.0, 41.0), values)
 
-    _, (_, high) = plot.ranges()
+    _, (_, high) = ranges_of(plot)
 
     assert high > 5000
 
@@ -92,7 +93,7 @@ def test_axes_are_drawn_anew_only_when_their_range_changes(qtbot: QtBot) -> None
         plot.set_data(images, values)
         plot.grab()
         drawn.append(axis.picture)
-        (_, _), (bottom, top) = plot.ranges()
+        (_, _), (bottom, top) = ranges_of(plot)
         assert bottom < values.min() < values.max() < top
 
     assert drawn[0] is not None
@@ -102,12 +103,12 @@ def test_axes_are_drawn_anew_only_when_their_range_changes(qtbot: QtBot) -> None
 
 def test_few_images_are_not_drawn_as_fractions(qtbot: QtBot) -> None:
     plot = shown(qtbot, TracePlot(Axes("RMS residual / px")))
-    (left, right), _ = plot.ranges()
+    (left, right), _ = ranges_of(plot)
     assert right - left >= 9
 
     plot.set_data(np.array([1.0, 2.0]), np.array([0.1, 0.2]))
 
-    (left, right), _ = plot.ranges()
+    (left, right), _ = ranges_of(plot)
     assert left <= 1
     assert right >= 10
 
@@ -152,10 +153,10 @@ def test_decades_are_numbered_before_what_is_between_them(decades: TracePlot) ->
 
 def test_without_images_the_axes_are_as_at_the_beginning(qtbot: QtBot) -> None:
     plot = shown(qtbot, TracePlot(Axes("RMS residual / px")))
-    before = plot.ranges()
+    before = ranges_of(plot)
     plot.set_data(np.arange(20.0, 80.0), np.linspace(3.0, 9.0, 60))
-    assert plot.ranges() != before
+    assert ranges_of(plot) != before
 
     plot.set_data(np.empty(0), np.empty(0))
 
-    assert plot.ranges() == before
+    assert ranges_of(plot) == before

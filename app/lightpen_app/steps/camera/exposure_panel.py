@@ -57,16 +57,27 @@ class ExposurePanel(Translated, QFrame):
         self._levels = text_label(TextSize.LEAD)
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
         self._exposure_name = self.say(QLabel(), self.tr("E&xposure"))
+        keys = self.tr(
+            "Up and Down keys change the value; Enter applies a typed number."
+        )
         self._exposure = self.say(
-            SettingField("ms", (0.01, 1000.0), 2), self.tr("Exposure")
+            SettingField("ms", (0.01, 1000.0), 2), self.tr("Exposure"), tip=keys
         )
         self._exposure_name.setBuddy(self._exposure)
         self._gain_name = self.say(QLabel(), self.tr("&Gain"))
-        self._gain = self.say(SettingField("dB", (0.0, 48.0), 1), self.tr("Gain"))
+        self._gain = self.say(
+            SettingField("dB", (0.0, 48.0), 1), self.tr("Gain"), tip=keys
+        )
         self._exposure.setMinimumWidth(EXPOSURE_WIDTH)
         self._gain.setMinimumWidth(GAIN_WIDTH)
         self._gain_name.setBuddy(self._gain)
-        self._adjust = PushButton()
+        self._adjust = self.say(
+            PushButton(),
+            tip=self.tr(
+                "Sets exposure and gain so that the brightest LED reaches 80 % of "
+                "full scale."
+            ),
+        )
         self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)
         self._why_fixed.setMinimumHeight(5 * GRID)  # as the fields in its place
 
@@ -87,7 +98,6 @@ class ExposurePanel(Translated, QFrame):
         self._gain.value_changed.connect(self.gain_changed)
         self._adjust.clicked.connect(self._on_adjust_clicked)
 
-        self._retranslate()
         self.set_camera(None, CameraSettings())
 
     def set_value(self, value: Exposure) -> None:
@@ -159,16 +169,6 @@ class ExposurePanel(Translated, QFrame):
         adjustment = self._adjustment
         return adjustment is not None and adjustment.outcome is ExposureState.ADJUSTING
 
-    def _retranslate(self) -> None:
-        for field in (self._exposure, self._gain):
-            set_tooltip(
-                field,
-                self.tr(
-                    "Up and Down keys change the value; Enter applies a typed number."
-                ),
-            )
-        self._refresh()
-
     def _show_levels(self) -> None:
         value = self._value
         self._verdict.set_value(self.verdict())
@@ -188,13 +188,6 @@ class ExposurePanel(Translated, QFrame):
         self._show_levels()
         self._adjust.setText(
             self.tr("Stop") if self._is_adjusting else self.tr("Auto exposure (LEDs)")
-        )
-        set_tooltip(
-            self._adjust,
-            self.tr(
-                "Sets exposure and gain so that the brightest LED reaches 80 % of "
-                "full scale."
-            ),
         )
         if self._capabilities is None:
             self._why_fixed.setText(self.tr("No images are received."))
@@ -313,15 +306,7 @@ class FocusPanel(Translated, QFrame):
         shown = self._verdict, self._number, (self._hint, 1)
         vertical_layout(self, *shown, margins=PADDING)
 
-        self._retranslate()
-
-    def verdict(self) -> str:
-        """Return whether the LEDs are sharp, in words."""
-        return self._verdict.value().text
-
-    def number(self) -> str:
-        """Return the edge width, and the smallest so far."""
-        return self._number.text()
+        self._refresh()
 
     def add(self, inspection: Inspection) -> None:
         """Show one more image."""
@@ -366,9 +351,6 @@ class FocusPanel(Translated, QFrame):
         else:
             hint = self.tr("Turn the focus ring until the edge width is smallest.")
         self._hint.setText(hint)
-
-    def _retranslate(self) -> None:
-        self._refresh()
 
 
 class ExposureControl(QObject):

@@ -113,7 +113,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, value: CameraFile | None) -> None:
         """Show another file and clear the message about the previous one."""
@@ -157,9 +157,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self.tr("Intrinsics of camera and lens"),
             self.tr("Intrinsics files ({0})").format(FILES),
         )
-
-    def _retranslate(self) -> None:
-        self._refresh()
 
     def _refresh(self) -> None:
         camera = None if self._file is None else self._file.camera

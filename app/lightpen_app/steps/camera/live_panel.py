@@ -63,7 +63,7 @@ class LivePanel(Translated, QWidget):
         self._switch.value_changed.connect(self.camera_chosen)
 
         self.set_cameras(1, 0)
-        self._retranslate()
+        self._refresh()
 
     def set_cameras(self, n_cameras: int, shown: int) -> None:
         """Set the number of cameras to choose from, and the one shown, from 0."""
@@ -72,10 +72,6 @@ class LivePanel(Translated, QWidget):
             self._forget()
         self._shown = shown
         self._switch.set_value(shown)
-
-    def figures(self) -> str:
-        """Return the number of spots, the frame rate and the size of the image."""
-        return self._figures.text()
 
     def set_image(self, shown: DisplayedImage, stats: Stats) -> None:
         """Show another image and the frame counters."""
@@ -115,9 +111,6 @@ class LivePanel(Translated, QWidget):
         self._arrivals.clear()
         self._n_lost.clear()
         self._figures.clear()
-
-    def _retranslate(self) -> None:
-        self._refresh()
 
     def _refresh(self) -> None:
         self._state.set_value(self._remark())

@@ -69,7 +69,7 @@ class CameraPage(Page):
         self._live.failed.connect(self._on_failed)
         workbench.notifications.withdrawn.connect(self._show_connection)
 
-        self._retranslate()
+        self._refresh()
         self._on_workbench_changed()
 
     @override
@@ -119,7 +119,7 @@ class CameraPage(Page):
         self._beside.shut_down()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._on_swing_changed()
         self._show_connection()
         self.changed.emit()

@@ -64,11 +64,7 @@ class RigPanel(Translated, QGroupBox):
         self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
 
-        self._retranslate()
-
-    def problem(self) -> StatusMessage:
-        """Return why the file that was chosen last is not the one in use."""
-        return self._problem.value()
+        self._refresh()
 
     def set_value(self, is_wanted: bool, file: RigFile | None) -> None:
         """Show whether there are two cameras, and their file.
@@ -109,9 +105,6 @@ class RigPanel(Translated, QGroupBox):
             self.tr("Rig file of both cameras"),
             self.tr("Rig files ({0})").format(FILES),
         )
-
-    def _retranslate(self) -> None:
-        self._refresh()
 
     def _refresh(self) -> None:
         is_wanted = self._second.isChecked()

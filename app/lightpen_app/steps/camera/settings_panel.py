@@ -118,13 +118,13 @@ class SettingsPanel(Translated, QGroupBox):
         for field in (self._width, self._height, self._x, self._y):
             field.value_changed.connect(self._on_region_edited)
 
-        self._retranslate()
+        self._refresh()
         self.set_camera(None, CameraSettings())
 
     def set_stats(self, stats: Stats) -> None:
         """Show the frame counters of this camera."""
         self._stats = stats
-        self._retranslate_counts()
+        self._refresh_counts()
 
     def set_camera(
         self, caps: CameraCapabilities | None, settings: CameraSettings
@@ -147,7 +147,7 @@ class SettingsPanel(Translated, QGroupBox):
         for widget in (self._trigger_name, self._trigger):
             widget.setVisible(len(triggers) > 1)
         self._offer_region(caps, settings.region)
-        self._retranslate_triggers()
+        self._refresh_triggers()
         self._hint.set_value(self._format_hint())
 
     def _offer(
@@ -227,7 +227,7 @@ class SettingsPanel(Translated, QGroupBox):
         )
         return StatusMessage.warning(words)
 
-    def _retranslate_counts(self) -> None:
+    def _refresh_counts(self) -> None:
         stats = self._stats
         counts = (
             self.tr("Received: {0}").format(stats.delivered),
@@ -237,7 +237,7 @@ class SettingsPanel(Translated, QGroupBox):
         )
         self._counts.setText(PARTED.join(map(on_one_line, counts)))
 
-    def _retranslate_triggers(self) -> None:
+    def _refresh_triggers(self) -> None:
         words = {
             TriggerMode.FREE: self.tr("Free running"),
             TriggerMode.SOFTWARE: self.tr("Software trigger"),
@@ -246,8 +246,8 @@ class SettingsPanel(Translated, QGroupBox):
             mode = TriggerMode(self._trigger.itemData(index))
             self._trigger.setItemText(index, words[mode])
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._rate.set_unit(self.tr("fps"))
-        self._retranslate_counts()
-        self._retranslate_triggers()
+        self._refresh_counts()
+        self._refresh_triggers()
         self._hint.set_value(self._format_hint())

@@ -39,7 +39,7 @@ class DeviceField(ChoiceField):
         self.setEditable(True)
         self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self._edit = edit = EnterEdit()
+        self.edit = edit = EnterEdit()
         self.setLineEdit(edit)
         self.setCompleter(None)  # type: ignore[arg-type] # Qt takes it away by this
 
@@ -63,15 +63,9 @@ class DeviceField(ChoiceField):
                 self.addItem(device.label, device.place)
         self.set_value(self._value)
 
-    def set_name(self, name: str) -> None:
-        """Set the label of the field."""
-        self.setAccessibleName(name)
-        self._edit.setAccessibleName(name)
-        self._edit.setPlaceholderText(name)
-
     def set_faulty(self, faulty: bool) -> None:
         """Mark the camera as one that cannot be opened."""
-        set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
+        set_tone(self.edit, Tone.BAD if faulty else Tone.PLAIN)
 
     def _on_activated(self, index: int) -> None:
         self._take(str(self.itemData(index)))
@@ -112,7 +106,12 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome: Callable[[], StatusMessage] = StatusMessage
 
         # Widgets
-        self._kind = self.say(ChoiceField(), hint=self.tr("Choose your camera"))
+        title = self.tr("Image source")
+        if is_second:
+            title = self.tr("Image source of the second camera")
+        self.say(self, title)
+        choose = self.tr("Choose your camera")
+        self._kind = self.say(ChoiceField(), title, hint=choose)
         # No wider than its neighbours, however long its words.
         self._kind.setSizeAdjustPolicy(
             ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -138,6 +137,9 @@ class SourcePanel(Translated, QGroupBox):
         )
         self._producer.add_button(self._open_producer)
         self._device = DeviceField()
+        place = self.tr("Serial number or address")
+        self.say(self._device, place)
+        self.say(self._device.edit, hint=place)
         self._search = self.make_button(self.tr("Search"), self.search_requested)
         self._remark_label = SignLabel()
         self._offers = QWidget()  # the cameras found, before a source is chosen
@@ -172,7 +174,6 @@ class SourcePanel(Translated, QGroupBox):
         self._use_found.clicked.connect(self._on_use_found_clicked)
         FileDrops(self).dropped.connect(self._on_dropped)
 
-        self._retranslate()
         self.set_faulty(False)
         self._refresh()
 
@@ -199,7 +200,7 @@ class SourcePanel(Translated, QGroupBox):
     def set_absent(self, absent: Mapping[str, Message]) -> None:
         """Show what must be installed for sources, by their keys."""
         self._absent = absent
-        self._retranslate()
+        self._refresh()
 
     @property
     def is_searching(self) -> bool:
@@ -317,6 +318,7 @@ class SourcePanel(Translated, QGroupBox):
             self.value_changed.emit(value)
 
     def _refresh(self) -> None:
+        self._refresh_kinds()
         needs, absent = self._needs, self._absent.get(self._value.source.key)
         is_open = self._value.source not in self._sources
         index = -1 if is_open else self._sources.index(self._value.source)
@@ -366,22 +368,14 @@ class SourcePanel(Translated, QGroupBox):
         self._use_found.setText(use)
         self._use_found.setVisible(is_offered)
 
-    def _retranslate(self) -> None:
-        self._refresh_beside()
-        title = self.tr("Image source")
-        if self._is_second:
-            title = self.tr("Image source of the second camera")
-        self.setTitle(title)
+    def _refresh_kinds(self) -> None:
         for index, source in enumerate(self._sources):
             name = worded(source.name)
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
-        self._kind.setAccessibleName(title)
         # On Linux the accessible name of a drop-down list is its current choice.
-        self._kind.setAccessibleDescription(title)
-        self._device.set_name(self.tr("Serial number or address"))
-        self._refresh()
+        self._kind.setAccessibleDescription(self.title())
 
 
 class SourceSearch(QObject):

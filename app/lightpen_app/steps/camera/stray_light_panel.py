@@ -59,7 +59,7 @@ class StrayLightPanel(Translated, QGroupBox):
         # Connections
         self._mask.clicked.connect(self._on_mask_clicked)
 
-        self._retranslate()
+        self._refresh()
 
     def found(self) -> FloatArray:
         """Return the circles (M, 3) that were found and are not masked yet, px."""
@@ -117,9 +117,6 @@ class StrayLightPanel(Translated, QGroupBox):
         circles = self._found
         self.give_up()
         self.mask_requested.emit(circles)
-
-    def _retranslate(self) -> None:
-        self._refresh()
 
     def _refresh(self) -> None:
         n_found = len(self._found)

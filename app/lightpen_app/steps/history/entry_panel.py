@@ -213,7 +213,7 @@ class EntryPanel(Translated, QWidget):
         self._report.clicked.connect(self._request_report)
         self._reason.given.connect(self._on_given)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> Line | None:
         """Return the displayed line."""
@@ -225,12 +225,12 @@ class EntryPanel(Translated, QWidget):
             return
         self._line, self._messages = line, ()
         self._reason.hide()
-        self._retranslate()
+        self._refresh()
 
     def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
         """Show the messages on the entry."""
         self._messages = tuple(remarks)
-        self._retranslate()
+        self._refresh()
 
     def words(self) -> tuple[str, ...]:
         """Return the texts on the entry."""
@@ -263,7 +263,7 @@ class EntryPanel(Translated, QWidget):
     def _on_given(self, text: str, signature: Signature | None) -> None:
         self.note_given.emit(self._asked, text)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         line, entry = self._line, None if self._line is None else self._line.entry
         is_changed = line is not None and entry is None
         self._word_question()

@@ -155,7 +155,7 @@ class HistoryTable(Translated, RowTable):
         chosen.currentRowChanged.connect(self.selection_changed)
         chosen.selectionChanged.connect(self.selection_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def set_lines(self, n_lines: int, first: Sequence[Line]) -> None:
         """Show other entries; the newest of them is current."""
@@ -206,7 +206,7 @@ class HistoryTable(Translated, RowTable):
             self.setColumnHidden(column, is_alone or not action.isChecked())
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         for action, title in zip(self._shown, self._model.titles(), strict=False):
             action.setText(title)
         self.show_other_words()
@@ -295,7 +295,7 @@ class FilterBar(Translated, QWidget):
         for day in (self._begin, self._end):
             day.value_changed.connect(self.value_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> EntryFilter:
         """Return the filter; the last day is included."""
@@ -328,7 +328,7 @@ class FilterBar(Translated, QWidget):
         self._list_tips()
         self.value_changed.emit()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         for i, kind in enumerate(Kind, start=1):
             self._kind.setItemText(i, kind_text(kind))
 

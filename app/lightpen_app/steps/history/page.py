@@ -1,41 +1,128 @@
 """The step History: the complete history of pens and tips."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
-from lightpen_app.face import Services
+from lightpen.archive.chains import Kind, StoredEntry
+from lightpen.archive.history import (
+    EntryFilter,
+    KnownNames,
+    Line,
+    due_tips,
+    known_names,
+    lines,
+    messages_on,
+    n_wanted,
+)
+from lightpen.archive.logbook import Logbook, ReplicationState
+from lightpen.archive.trends import Trend, trend_of
+from lightpen.model.limits import DueRule
+from lightpen_app.face import Services, event_text, report_printer
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.widgets.controls import LazyWidget
+from lightpen_app.look.theme import GRID
+from lightpen_app.steps.history.archive_panel import NOTICE, ArchivePanel, DuePanel
+from lightpen_app.steps.history.entry_panel import EntryPanel
+from lightpen_app.steps.history.history_table import FilterBar, HistoryTable
+from lightpen_app.widgets.fields import Text
 from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.page import MainAction, Page
+from lightpen_app.widgets.trend_panel import TrendPanel
+from lightpen_app.work.job import Job, LatestJob
 from lightpen_app.work.workbench import Workbench
 
-if TYPE_CHECKING:
-    from lightpen.archive.checks import ArchiveCheckResult
-    from lightpen_app.steps.history.content import HistoryContent
+T = TypeVar("T")
+TABLE_SHARE, TABS_SHARE = 3, 4  # of the height
+LEAST_TABS = 16 * GRID  # px
+BLOCK = 200  # lines that are read at one time
+
+
+@dataclass(frozen=True)
+class FirstEntries:
+    """The first data read for a filter."""
+
+    n_lines: int
+    first: tuple[Line, ...]  # the newest
+    names: KnownNames
+    # Replication to the server; None without a server.
+    delivery: ReplicationState | None
 
 
 class HistoryPage(Page):
-    """The step History."""
+    """Shows the entries found, and statistics of their tips."""
 
     key = "history"
 
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
-        self._workbench, self._services = workbench, services
+        kind_of = partial(event_text, services)
         self._run = workbench.run
+        self._chosen, self._tips = workbench.selection, workbench.library
+        self._settings = workbench.settings
+        self._notices = workbench.notifications
+        self._folder = workbench.folder
+        self._print_report = report_printer(services, workbench.save_place, self)
+        self._trend = Trend()
+        self._rule = DueRule()
+        self._wanted = EntryFilter()
+        self._followed: EntryFilter | None = None  # whose trend it is
+        self._entries, self._due_tips = LatestJob(self), LatestJob(self)
+        self._more, self._trends = LatestJob(self), LatestJob(self)
+        self._messages = LatestJob(self)
 
-        # Widgets
-        self._content: LazyWidget[HistoryContent] = LazyWidget(self._make_content)
-        scroll = PageScroll()
-        scroll.setWidget(ShrinkingScrollContent(self._content))
+        # Widgets: the order of making them is the order of the Tab key
+        self._filter = FilterBar()
+        self._table = HistoryTable(kind_of)
+        self._tabs = QTabWidget()
+        self._entry = EntryPanel(kind_of)
+        self._trend_panel = TrendPanel()
+        made = (each.selection_tab() for each in services)
+        self._of_services = tuple(filter(None, made))
+        self._due = DuePanel(workbench.around.now)
+        self._archive = ArchivePanel(workbench, self._filter.value)
+        tabs = (
+            (self._trend_panel, self.tr("Trend")),
+            (self._entry, self.tr("Entry")),
+            *((each, Text(each.title)) for each in self._of_services),
+            (self._due, self.tr("Due")),
+            (self._archive, self.tr("Archive")),
+        )
+        for panel, _ in tabs:
+            tab = PageScroll()
+            is_squeezed = panel is self._trend_panel  # the others have wrapping text
+            tab.setWidget(ShrinkingScrollContent(panel) if is_squeezed else panel)
+            self._tabs.addTab(tab, "")
+        self.say_items(self._tabs, (name for _, name in tabs))
+        self._tabs.setMinimumHeight(LEAST_TABS)
 
         # Layout
+        content, scroll = ShrinkingScrollContent(), PageScroll()
+        shares = (self._table, TABLE_SHARE), (self._tabs, TABS_SHARE)
+        vertical_layout(content, self._filter, *shares)
+        scroll.setWidget(content)
         vertical_layout(self, scroll)
 
-        self._retranslate()
+        # Connections
+        self._filter.value_changed.connect(self._read_anew)
+        self._table.more_wanted.connect(self._read_more)
+        self._table.columns_changed.connect(self._on_columns_changed)
+        self._table.selection_changed.connect(self._on_selection_changed)
+        self._entry.note_given.connect(self._enter_note)
+        self._entry.report_requested.connect(self._show_report)
+        self._entry.set_has_report(self._print_report.is_here)
+        self._print_report.saved.connect(self._on_report_saved)
+        self._print_report.failed.connect(self._show_fault)
+        for each in self._of_services:
+            each.verification_kept.connect(self._on_verification_kept)
+        self._archive.checked.connect(self.changed)
+        workbench.selection.changed.connect(self._on_workbench_changed)
+
+        self._table.set_hidden_columns(self._settings.last().hidden_columns)
 
     @override
     def lead(self) -> str:
@@ -44,12 +131,12 @@ class HistoryPage(Page):
     @override
     def is_complete(self) -> bool:
         """Return whether the present swing is in the archive, or that was checked."""
-        return self._run.status.result is not None or self._check_result() is not None
+        return self._run.status.result is not None or self._archive.found is not None
 
     @override
     def is_doubtful(self) -> bool:
-        checked = self._check_result()
-        return checked is not None and bool(checked.findings)
+        found = self._archive.found
+        return found is not None and bool(found.findings)
 
     @override
     def main_action(self) -> MainAction:
@@ -61,32 +148,167 @@ class HistoryPage(Page):
 
     @override
     def first_control(self) -> QWidget:
-        return self._content.content().table
+        return self._table
 
     @override
     def entered(self) -> None:
-        self._content.content().read_anew()
+        self._read_anew()
 
     @override
     def shut_down(self) -> None:
-        content = self._content.content_so_far()
-        if content is not None:
-            content.shut_down()
+        self._print_report.shut_down()
+        self._archive.shut_down()
+        for job in (self._entries, self._due_tips):
+            job.cancel()
+        self._drop_details()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.changed.emit()
 
-    def _make_content(self) -> "HistoryContent":
-        # Imported here: with the archive it takes 0.25 s.
-        from lightpen_app.steps.history.content import HistoryContent
+    # What is read
 
-        content = HistoryContent(self._workbench, self._services)
+    def _read(
+        self, job: LatestJob, query: Callable[[Logbook], T], show: Callable[[T], object]
+    ) -> None:
+        logbook = self._run.logbook
+        job.start(lambda _: query(logbook.opened()), show, self._show_fault)
 
-        # Connections
-        content.checked.connect(self.changed)
-        return content
+    def _drop_details(self) -> None:
+        for job in (self._more, self._trends, self._messages):
+            job.cancel()
 
-    def _check_result(self) -> "ArchiveCheckResult | None":
-        content = self._content.content_so_far()
-        return None if content is None else content.check_result()
+    def _read_anew(self) -> None:
+        """Read the number of entries of the filter, and the newest ones."""
+        self._wanted = wanted = self._filter.value()
+        self._drop_details()
+
+        def read(logbook: Logbook) -> FirstEntries:
+            database = logbook.database
+            return FirstEntries(
+                n_wanted(database, wanted),
+                lines(database, wanted, 0, BLOCK),
+                known_names(database),
+                logbook.delivery(),
+            )
+
+        self._read(self._entries, read, self._on_read)
+
+    def _read_more(self, first: int) -> None:
+        """Read the lines after as many others."""
+        wanted = self._wanted
+        self._read(
+            self._more,
+            lambda logbook: lines(logbook.database, wanted, first, BLOCK),
+            partial(self._table.add_lines, first),
+        )
+
+    def _read_due(self) -> None:
+        self._rule = rule = self._chosen.limits.due
+        library = self._tips.library
+        self._read(
+            self._due_tips,
+            lambda logbook: due_tips(logbook.database, logbook.chain, rule, library),
+            self._due.set_tips,
+        )
+
+    def _on_workbench_changed(self) -> None:
+        if self.isVisible() and self._chosen.limits.due != self._rule:
+            self._read_due()
+
+    # What is shown
+
+    def _show_fault(self, sentence: str) -> None:
+        self._notices.notify(NOTICE, sentence)
+
+    def _on_read(self, found: FirstEntries) -> None:
+        self._filter.set_known(found.names)
+        self._trend, self._followed = Trend(), None
+        self._entry.set_value(None)
+        self._archive.set_delivery(found.delivery)
+        self._table.set_stations(found.names.stations)
+        self._table.set_lines(found.n_lines, found.first)
+        if self._followed is None:
+            self._on_trend_read(Trend())
+        n_lines = found.n_lines
+        words = self.tr("1 entry") if n_lines == 1 else self.tr("{0} entries")
+        self._notices.show_status(words.format(n_lines))
+        # Deferred until the visible parts are shown.
+        self._read_due()
+
+    def _on_columns_changed(self) -> None:
+        self._settings.set_last(hidden_columns=self._table.hidden_columns())
+
+    def _on_selection_changed(self) -> None:
+        line = self._table.current()
+        entry = None if line is None else line.entry
+        if line != self._entry.value():
+            self._entry.set_value(line)
+            if entry is not None:
+                self._read(
+                    self._messages,
+                    lambda logbook: messages_on(logbook.database, entry),
+                    self._entry.set_messages,
+                )
+                self._follow(entry)
+        self._trend_panel.mark(_hash_of(line))
+        self._show_selection()
+
+    def _follow(self, entry: StoredEntry) -> None:
+        """Show the trend of an entry's pen and tip, within the filter."""
+        event = entry.entry.event
+        wanted = replace(
+            self._filter.value(),
+            pen=event.names.pen,
+            tip=event.names.tip,
+            is_simulated=event.is_simulated,
+        )
+        if wanted.pen and wanted.tip and wanted != self._followed:
+            self._followed = wanted
+            self._read(
+                self._trends,
+                lambda logbook: trend_of(logbook.database, wanted),
+                self._on_trend_read,
+            )
+
+    def _on_trend_read(self, trend: Trend) -> None:
+        self._trend = trend
+        self._trend_panel.set_value(trend)
+        self._trend_panel.mark(_hash_of(self._table.current()))
+        self._show_selection()
+
+    def _show_selection(self) -> None:
+        entries = [line.entry for line in self._table.selected()]
+        selected = [entry for entry in entries if entry is not None]
+        for each in self._of_services:
+            each.set_value(selected, self._trend)
+
+    # What is entered
+
+    def _enter_note(self, about: StoredEntry, text: str) -> None:
+        """Enter a comment, also during operations on the whole archive."""
+        logbook, operator = self._run.logbook, self._chosen.preparation.names.operator
+        job = Job(lambda _: logbook.opened().enter_note(about, text, operator), self)
+        job.start(self._read_anew, self._show_fault)
+
+    # What is printed
+
+    def _show_report(self, entry: StoredEntry) -> None:
+        result, folder = entry.entry.event.result, self._folder
+        if result is None:
+            return
+        if entry.entry.event.kind is Kind.VERIFICATION:
+            self._print_report.show_verification(folder / result.place)
+        else:
+            self._print_report.show(lambda: folder / result.place)
+
+    def _on_verification_kept(self, file: Path) -> None:
+        self._read_anew()
+        self._print_report.show_verification(file)
+
+    def _on_report_saved(self, path: Path) -> None:
+        self._notices.show_status(self.tr("Saved in {0}").format(path.parent))
+
+
+def _hash_of(line: Line | None) -> str:
+    return "" if line is None or line.entry is None else line.entry.sha256

@@ -88,7 +88,7 @@ class LedFilePanel(Translated, QWidget):
         self._units.textActivated.connect(self._on_units_chosen)
         self.question.declined.connect(self._on_declined)
 
-        self._retranslate()
+        self._refresh()
 
     def set_narrow(self, narrow: bool) -> None:
         """Place the buttons below the path, or beside it."""
@@ -103,10 +103,6 @@ class LedFilePanel(Translated, QWidget):
         self._value = path
         self._path.set_value(path)
 
-    def problem(self) -> str:
-        """Return the message on the file."""
-        return self._problem.value().text
-
     def set_problem(self, sentence: str) -> None:
         """Set or clear the message."""
         self._path.set_faulty(bool(sentence))
@@ -116,7 +112,7 @@ class LedFilePanel(Translated, QWidget):
         """Ask for missing units; an empty text ends the question."""
         self._unit_asked = name
         self._units.setCurrentIndex(0)
-        self._retranslate()
+        self._refresh()
         self._units_row.setVisible(bool(name))
         if name:
             give_focus(self._units)
@@ -150,7 +146,7 @@ class LedFilePanel(Translated, QWidget):
         self.ask_units("")
         self._path.set_value(self._value)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         words = self.tr("{0} does not state the unit of its coordinates. Choose it:")
         self._units_words.set_value(
             StatusMessage.warning(words.format(self._unit_asked))

@@ -61,7 +61,7 @@ class MatchPanel(Translated, QGroupBox):
         # Layout
         vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0)
 
-        self._retranslate()
+        self._refresh()
 
     def set_image(self, shown: DisplayedImage) -> None:
         """Show another image."""
@@ -127,11 +127,8 @@ class MatchPanel(Translated, QGroupBox):
         self._sigmas.clear()
         self._counts.clear()
 
-    def _retranslate(self) -> None:
-        self.view.set_message(self.tr("No image yet"))
-        self._refresh()
-
     def _refresh(self) -> None:
+        self.view.set_message(self.tr("No image yet"))
         found = self._found()
         for i, remark in enumerate(self._messages):
             remark.set_value(found[i] if i < len(found) else StatusMessage())

@@ -152,7 +152,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._matching.watch.stop()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._files.retranslate()
         self._matching.retranslate()
         self._on_file_changed()
@@ -170,7 +170,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _on_selection_changed(self) -> None:
         source = self._selection.preparation.source
         self._file.set_has_samples(source.kind == SourceKind.SIMULATED)
-        self._refresh()
+        self._show_pen()
 
     def _on_file_changed(self) -> None:
         """Show the LEDs of the open file, and the correction that its frame needs."""
@@ -197,10 +197,10 @@ class LedsPage(ResponsiveLayout, Page):
         set_tooltip(self._space.frame, "" if remark is None else worded(remark))
         self._space.correct.setText(verb)
         self._space.correct.setVisible(bool(verb))
-        self._refresh()
+        self._show_pen()
         self.changed.emit()
 
-    def _refresh(self) -> None:
+    def _show_pen(self) -> None:
         """Show the pen of the open file and the nominal tip in use."""
         opened, tip = self._files.opened, self._selection.preparation.nominal_tip
         pen = None if opened is None else opened.pen
@@ -235,5 +235,5 @@ class LedsPage(ResponsiveLayout, Page):
         self._shown_match = match
         self._match.set_value(match)
         self._file.question.refresh()  # the pen may only have entered the image
-        self._refresh()
+        self._show_pen()
         self.changed.emit()

@@ -60,7 +60,7 @@ class LedTable(Translated, QTableWidget):
         # Connections
         self.currentCellChanged.connect(self._on_current_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, pen: Pen | None) -> None:
         """Show another pen; None clears the table."""
@@ -86,10 +86,6 @@ class LedTable(Translated, QTableWidget):
             sign = sign_icon(self, Sign.WARNING, Tone.WARN) if reason else None
             number.setData(Qt.ItemDataRole.DecorationRole, sign)
 
-    def chosen(self) -> int:
-        """Return the number of the current LED, 0 for none."""
-        return self.currentRow() + 1
-
     def set_chosen(self, led: int) -> None:
         """Make the row of another LED current."""
         self.setCurrentCell(led - 1, 0)
@@ -114,7 +110,7 @@ class LedTable(Translated, QTableWidget):
             self.led_chosen.emit(row + 1)
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         places = (f"{axis} / mm" for axis in "xyz")
         self.setHorizontalHeaderLabels(
             [self.tr("LED"), *places, "nx", "ny", "nz", self.tr("RMS / px")]
@@ -144,7 +140,7 @@ class LedTablePanel(Translated, QGroupBox):
         # Layout
         vertical_layout(self, (self.table, 1), self._facts)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, pen: Pen | None, tip: FloatArray | None) -> None:
         """Show another pen, or none.
@@ -158,10 +154,10 @@ class LedTablePanel(Translated, QGroupBox):
         """
         self._pen, self._tip = pen, tip
         self.table.set_value(pen)
-        self._retranslate()
+        self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         pen, tip = self._pen, self._tip
         if pen is None:
             self._facts.setText("")

@@ -105,7 +105,7 @@ class ImageTable(Translated, RowTable):
         chosen.currentRowChanged.connect(self._on_current_row_changed)
         chosen.selectionChanged.connect(self.selection_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> tuple[ImageRow, ...]:
         """Return the images in their order."""
@@ -160,7 +160,7 @@ class ImageTable(Translated, RowTable):
                 return
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.show_other_words()
 
     def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:

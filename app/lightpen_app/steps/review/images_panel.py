@@ -103,7 +103,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._shortcut(QKeySequence.StandardKey.Delete, self._exclude.click)
         self._shortcut(Qt.Key.Key_Insert, self._include.click)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def _use_room(self) -> None:
@@ -158,7 +158,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         shortcut.activated.connect(act)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._misfits.set_axes(
             Axes(self.tr("RMS / px (x: excluded)"), self.tr("image"))
         )

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QTimer, Slot
 from PySide6.QtGui import QPaintEvent
@@ -11,13 +10,14 @@ from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.model.names import Method
-from lightpen.record.results.acceptance import SwingAssessment
+from lightpen.record.library.supervision import Signature
+from lightpen.record.results.acceptance import SwingAssessment, takes_supervisor
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services, press_comparison, verify_step
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.review.acceptance import AcceptanceControl
-from lightpen_app.steps.review.result_export import ResultExport
+from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.result_panel import bending_message, reviewed_result
 from lightpen_app.steps.review.view import ReviewView
 from lightpen_app.steps.review.view_state import (
@@ -25,6 +25,7 @@ from lightpen_app.steps.review.view_state import (
     differs,
     next_step,
     next_step_text,
+    repeat_question,
     returns_to_swing,
     review_action,
     review_page_state,
@@ -34,10 +35,6 @@ from lightpen_app.steps.review.view_state import (
 )
 from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.work.workbench import Workbench
-
-if TYPE_CHECKING:
-    from lightpen_app.steps.review.images_panel import ImagesPanel
-    from lightpen_app.steps.review.plots_panel import MethodsPanel
 
 READING_MS = 1000  # from the first sight of a result to its acceptance, at least
 
@@ -55,15 +52,13 @@ class ReviewPage(Page):
         self._shown = SwingStatus()
 
         # Widgets
-        self._view = view = ReviewView(self._run, services)
+        self._view = view = ReviewView(self._run, workbench.save_place, services)
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
         self._painted: SwingAssessment | None = None  # since it is shown
-        self._acceptance = AcceptanceControl(self._selection, self._run, view)
         self._press = press_comparison(services)
         self._library, self._now = workbench.library, workbench.around.now
-        self._along = ResultExport(self._run, workbench.save_place, services, self)
 
         # Layout
         vertical_layout(self, view)
@@ -78,17 +73,22 @@ class ReviewPage(Page):
         view.solving.cancelled.connect(cancel)
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
-        view.tabs.images_made.connect(self._on_images_made)
-        view.tabs.methods_made.connect(self._on_methods_made)
-        self._along.follow(view.tools)
+        view.accept.clicked.connect(self._ask_reason)
+        view.reason.given.connect(self._accept)
+        view.repeat.clicked.connect(self._ask_to_repeat)
+        view.take_back.clicked.connect(self._ask_to_revoke)
+        view.withdrawal.given.connect(self._revoke)
+        self._run.refused.connect(self._on_refused)
+        view.tabs.images.made.connect(self._on_images_made)
+        view.tabs.methods.made.connect(self._on_methods_made)
         view.tools.set_can_press(self._press.is_here)
         view.tools.press_requested.connect(lambda: self._ask(SwingWorkflow.press))
         self._library.changed.connect(self._show_bending)
         self._press.compared.connect(view.result.set_bending)
-        self._along.message_sent.connect(notices.show_status)
-        self._along.failed.connect(partial(notices.notify, self.key))
+        view.tools.message_sent.connect(notices.show_status)
+        view.tools.failed.connect(partial(notices.notify, self.key))
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def lead(self) -> str:
@@ -146,7 +146,7 @@ class ReviewPage(Page):
                     "leds" if verdict is None else step_of_file(verdict.reason)
                 )
             case _:
-                self._acceptance.ask_to_repeat()
+                self._ask_to_repeat()
 
     @override
     def first_control(self) -> QWidget:
@@ -155,7 +155,7 @@ class ReviewPage(Page):
     @override
     def entered(self) -> None:
         self._on_run_changed()
-        self._refresh()
+        self._show_all()
 
     @override
     def left(self) -> None:
@@ -176,7 +176,7 @@ class ReviewPage(Page):
     @override
     def shut_down(self) -> None:
         self._press.shut_down()
-        self._along.shut_down()
+        self._view.tools.shut_down()
         self._view.tabs.shut_down()
 
     @Slot()
@@ -198,7 +198,7 @@ class ReviewPage(Page):
             self._view.summary.set_value(reviewed)
             self._view.result.set_value(reviewed)  # also while hidden
         if self.isVisible():
-            self._refresh()
+            self._show_all()
         self.changed.emit()
         if self.isVisible() and returns_to_swing(before, now):
             self.step_requested.emit("swing")
@@ -209,27 +209,27 @@ class ReviewPage(Page):
         words = partial(bending_message, self._run.status, library, today)
         self._view.result.set_bending(words)
 
-    def _refresh(self) -> None:
+    def _show_all(self) -> None:
         """Show the current state."""
         self._view.tabs.fill()
-        self._retranslate()
+        self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         names = self._selection.preparation.names
         state = review_page_state(self._run.status, names, self.main_action())
         self._view.set_state(state)
         if self._methods is not None:
             self._methods.set_locked(state.why_locked)
 
-    def _on_images_made(self, images: "ImagesPanel") -> None:
-        self._retranslate()
+    def _on_images_made(self, images: ImagesPanel) -> None:
+        self._refresh()
         images.exclude_requested.connect(self._exclude)
         images.include_requested.connect(self._include)
 
-    def _on_methods_made(self, methods: "MethodsPanel") -> None:
+    def _on_methods_made(self, methods: MethodsPanel) -> None:
         self._methods = methods
-        self._retranslate()
+        self._refresh()
         methods.method_chosen.connect(self._report_by)
 
     def _report_by(self, method: Method) -> None:
@@ -243,6 +243,38 @@ class ReviewPage(Page):
 
     def _include(self, numbers: list[int]) -> None:
         self._ask(lambda workflow: workflow.solving.include(numbers))
+
+    def _ask_to_repeat(self) -> None:
+        discard = partial(self._ask, SwingWorkflow.discard)
+        self._view.question.ask_about(repeat_question, discard)
+
+    def _ask_reason(self) -> None:
+        status = self._run.status
+        if status.assessment is not None:
+            supervision, station = self._selection.supervision, status.names.station
+            of_supervisor = takes_supervisor(supervision, status.assessment, station)
+            self._view.reason.ask(of_supervisor=of_supervisor)
+
+    def _accept(self, reason: str, signature: Signature | None) -> None:
+        self._ask(lambda workflow: workflow.solving.accept(reason, signature))
+
+    def _ask_to_revoke(self) -> None:
+        is_guarded = self._selection.supervision.is_guarded
+        self._view.withdrawal.ask(of_supervisor=is_guarded)
+
+    def _revoke(self, reason: str, signature: Signature | None) -> None:
+        result = self._run.status.result
+        if result is not None:
+            operator = self._selection.preparation.names.operator
+            self._ask(
+                lambda workflow: workflow.solving.revoke(
+                    result, operator, reason, signature
+                )
+            )
+
+    def _on_refused(self) -> None:
+        if self._run.status.result is None:
+            self._view.reason.refuse()
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

@@ -114,7 +114,7 @@ class ResidualsPanel(PlotsPanel):
         # Connections
         self._switch.value_changed.connect(self._on_camera_changed)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def set_failed(self, failed: FailedSwing, rig: Rig) -> None:
@@ -175,10 +175,10 @@ class ResidualsPanel(PlotsPanel):
         self._arrows.set_data(camera.image_size, points, residuals)
         numbers = [str(led + 1) for led in range(len(rms))]
         self._leds.set_data(numbers, rms, mean[:, 0], mean[:, 1])
-        self._retranslate()
+        self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         x, y = self.tr("x / px"), self.tr("y / px")
         for plot, title in (
             (self._arrows, self.tr("Residuals \xd7 {0}")),
@@ -221,10 +221,10 @@ class UncertaintyPanel(PlotsPanel):
             each.set_value(solution)
         coverage = solution.calibration.coverage
         self._postures.set_data(coverage.tilts, coverage.directions)
-        self._retranslate()
+        self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         if self._solution is not None:
             self._show_budget(self._solution)
 
@@ -271,10 +271,10 @@ class MethodsPanel(PlotsPanel):
     @override
     def _show(self, solution: Solution) -> None:
         self._reports.setChecked(solution.calibration.method == "two-stage")
-        self._retranslate()
+        self._refresh()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         if self._solution is not None:
             self._table.set_value(self._figures(self._solution))
 

@@ -60,20 +60,12 @@ class MisfitPlot(Plot):
         self._fit(x, np.append(heights, 1.2 * heights.max(initial=0.0)), y_zero=True)
         self.set_number(self._number)
 
-    def number(self) -> int | None:
-        """Return the number of the image that is marked."""
-        return self._number
-
     def set_number(self, number: int | None) -> None:
         """Mark an image by its number, or none."""
         self._number = number
         place = None if number is None else self._places.get(number)
         points = [] if place is None else [place]
         self._chosen.setData(pos=np.array(points).reshape(-1, 2))
-
-    def place_of(self, number: int) -> tuple[float, float]:
-        """Return x and y at which an image is drawn."""
-        return self._places[number]
 
     @override
     def _restyle(self) -> None:
@@ -118,10 +110,6 @@ class ResidualView(ImageView):
         self._arrows = NO_ARROWS
         super().__init__()
 
-    def arrows(self) -> Arrows:
-        """Return the arrows that are drawn."""
-        return self._arrows
-
     def set_arrows(self, arrows: Arrows) -> None:
         """Draw other arrows on the image that is shown."""
         self._arrows = arrows
@@ -159,6 +147,6 @@ class ResidualView(ImageView):
         painter.drawLines(lines)
 
     @override
-    def _retranslate(self) -> None:
-        super()._retranslate()
+    def _refresh(self) -> None:
+        super()._refresh()
         self.setAccessibleName(self.tr("Recorded image"))

@@ -1,10 +1,9 @@
-"""Opens the folder of a result, copies the tip, exports and prints the result."""
+"""Buttons that copy, export and print a result, and open its folder."""
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QWidget
 
@@ -20,7 +19,7 @@ from lightpen.record.exports import (
     exported_solution,
     save_new,
 )
-from lightpen_app.face import Services, report_printer
+from lightpen_app.face import Services, export_formats, report_printer
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.words import set_tooltip
@@ -34,25 +33,30 @@ TABLES = TABLE_FORMATS[:3]  # without the text that is pasted
 
 
 class ResultTools(Translated, QWidget):
-    """Three buttons; that to save has a menu, also with formats of extensions."""
+    """Buttons that copy, save and print a result, and start the press test.
 
-    folder_requested = Signal()  # open the folder of the swing
-    copy_requested = Signal()  # copy the tip to the clipboard
-    save_requested = Signal(object)  # tuple[ExportFormat, ...]
-    report_requested = Signal()  # show the printed report
+    The menu to save also has the formats of extensions.
+    """
+
     press_requested = Signal()  # start the press test
+    message_sent = Signal(str)  # what was done
+    failed = Signal(str)  # the sentence why something was not
 
-    def __init__(self, formats: Sequence[ExportFormat] = ()) -> None:
+    def __init__(self, run: SwingRun, place: SavePlace, services: Services) -> None:
         super().__init__()
-        single = [(each,) for each in (*TABLE_FORMATS, *formats)]
+        self._run, self._place, self._services = run, place, services
+        self._saving: Job | None = None
+        self._print_report = report_printer(services, place, self)
+        single = [(each,) for each in (*TABLE_FORMATS, *export_formats(services))]
 
         # Widgets
-        self._copy = self.make_button(self.tr("Copy tip"), self.copy_requested)
+        self._copy = self.make_button(self.tr("Copy tip"), self._copy_tip)
         self._save = self.make_button(self.tr("Save..."))
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
         menu.setToolTipsVisible(True)
         self._report = self.say(menu.addAction(""), self.tr("Calibration report..."))
+        self._report.setVisible(self._print_report.is_here)
         usual = [each for each in single if each[0].name == "csv"]
         others = [each for each in single if each not in usual]
         self._actions: list[tuple[tuple[ExportFormat, ...], QAction]] = [
@@ -76,12 +80,14 @@ class ResultTools(Translated, QWidget):
         # Connections
         for export, action in self._actions:
             action.triggered.connect(
-                lambda _=False, export=export: self.save_requested.emit(export)
+                lambda _=False, export=export: self._ask_laboratory(export)
             )
-        self._report.triggered.connect(self.report_requested)
-        self._folder.triggered.connect(self.folder_requested)
+        self._report.triggered.connect(self._show_report)
+        self._folder.triggered.connect(self._open_folder)
+        self._print_report.saved.connect(lambda path: self._report_saved(path.parent))
+        self._print_report.failed.connect(self.failed)
 
-        self._retranslate()
+        self._refresh()
 
     def set_why_not(self, why_not: str) -> None:
         """Disable all with a reason, or enable them."""
@@ -93,10 +99,6 @@ class ResultTools(Translated, QWidget):
     def set_can_press(self, can_press: bool) -> None:
         """Show the press test if something can compare it."""
         self._press.setVisible(can_press)
-
-    def set_has_report(self, has_report: bool) -> None:
-        """Show the report if something can show it."""
-        self._report.setVisible(has_report)
 
     def set_report_why_not(self, why_not: str) -> None:
         """Disable the report with a reason, or enable it."""
@@ -111,7 +113,7 @@ class ResultTools(Translated, QWidget):
         )
         self._press.set_why_not(why_not, tooltip)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         for export, action in self._actions:
             action.setText(self._name(export) + "...")
             described = (worded(each.description) for each in export)
@@ -122,37 +124,8 @@ class ResultTools(Translated, QWidget):
             return self.tr("Record and tables")
         return worded(export[0].label)
 
-
-class ResultExport(QObject):
-    """Carries out requests of the result tools."""
-
-    message_sent = Signal(str)  # what was done
-    failed = Signal(str)  # the sentence why something was not
-
-    def __init__(
-        self, run: SwingRun, place: SavePlace, services: Services, page: QWidget
-    ) -> None:
-        super().__init__(page)
-        self._run = run
-        self._place = place
-        self._page, self._services = page, services
-        self._saving: Job | None = None
-        self._print_report = report_printer(services, place, page)
-
-        # Connections
-        self._print_report.saved.connect(lambda path: self._report_saved(path.parent))
-        self._print_report.failed.connect(self.failed)
-
-    def follow(self, tools: ResultTools) -> None:
-        """Connect the requests of the buttons."""
-        tools.folder_requested.connect(self._open_folder)
-        tools.copy_requested.connect(self._copy_tip)
-        tools.save_requested.connect(self._ask_laboratory)
-        tools.report_requested.connect(self._show_report)
-        tools.set_has_report(self._print_report.is_here)
-
     def shut_down(self) -> None:
-        """Disconnect from all signals."""
+        """Cancel running jobs."""
         self._print_report.shut_down()
         if self._saving is not None:
             self._saving.cancel()
@@ -176,22 +149,22 @@ class ResultExport(QObject):
             self._ask_folder(export, None)
             return
         named = next(s for s in self._services if export[0] in s.export_formats())
-        named.ask_laboratory(self._page, partial(self._ask_folder, export))
+        named.ask_laboratory(self, partial(self._ask_folder, export))
 
     def _ask_folder(
         self, export: tuple[ExportFormat, ...], laboratory: Laboratory | None
     ) -> None:
-        dialog = QFileDialog(self._page, self.tr("Folder for saving"))
+        dialog = QFileDialog(self, self.tr("Folder for saving"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setOption(QFileDialog.Option.ShowDirsOnly)
         dialog.setDirectory(str(self._place.folder()))
         dialog.fileSelected.connect(
-            lambda path: self._save(export, laboratory, Path(path))
+            lambda path: self._save_in(export, laboratory, Path(path))
         )
         dialog.open()
 
-    def _save(
+    def _save_in(
         self,
         export: tuple[ExportFormat, ...],
         laboratory: Laboratory | None,

@@ -75,10 +75,6 @@ class TipReadout(QWidget):
         for name, axis in zip(self._names, AXES, strict=True):
             name.setText(axis)
 
-    def value(self) -> TipValue | None:
-        """Return the tip that is shown."""
-        return self._value
-
     def set_value(self, value: TipValue | None) -> None:
         """Show another tip, or none."""
         self._value = value
@@ -93,11 +89,6 @@ class TipReadout(QWidget):
             uncertainty.setText(f"\N{PLUS-MINUS SIGN} {within}")
             number.setAccessibleName(f"{axis} = {number.text()} mm")
             uncertainty.setAccessibleName(f"{uncertainty.text()} mm")
-
-    def texts(self) -> tuple[str, ...]:
-        """Return the numbers of x, y and z and their uncertainties, as shown."""
-        labels = zip(self._numbers, self._uncertainties, strict=True)
-        return tuple(f"{number.text()} {u.text()}" for number, u in labels)
 
 
 def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:
@@ -173,14 +164,14 @@ class TipSummary(Translated, QFrame):
         horizontal_layout(left, *row, spacing=2 * GRID)
         vertical_layout(layout, self._heading, self._readout, spacing=0, stretch=1)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, value: ReviewedResult | None) -> None:
         """Show another outcome, or none."""
         self._value = value
-        self._retranslate()
+        self._refresh()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         outcome = self._value
         if outcome is None:
             self._heading.setText(self.tr("Tip in the pen frame / mm, U (k = 2)"))
@@ -223,7 +214,7 @@ class ResultPanel(Translated, QFrame):
         layout.addSpacing(GRID)
         fill(layout, self._comparison, 1)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> ReviewedResult | None:
         """Return the outcome that is shown."""
@@ -237,9 +228,6 @@ class ResultPanel(Translated, QFrame):
     def set_bending(self, words: Callable[[], StatusMessage]) -> None:
         """Show the bending that counts for the tip, or the press test just made."""
         self._bending_words = words
-        self._refresh()
-
-    def _retranslate(self) -> None:
         self._refresh()
 
     def _refresh(self) -> None:

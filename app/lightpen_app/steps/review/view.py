@@ -1,13 +1,11 @@
 """View of the step Review: the verdict, the result and its details."""
 
 from functools import partial
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
-from lightpen_app.face import Services, export_formats, verify_step
+from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import (
     fill,
     horizontal_layout,
@@ -15,6 +13,13 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.plots_panel import (
+    MethodsPanel,
+    PlotsPanel,
+    ResidualsPanel,
+    UncertaintyPanel,
+)
 from lightpen_app.steps.review.result_export import ResultTools
 from lightpen_app.steps.review.result_panel import (
     ResultPanel,
@@ -37,52 +42,28 @@ from lightpen_app.widgets.fitting import (
     ShrinkingScrollContent,
 )
 from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.swing_run import SwingRun
-
-if TYPE_CHECKING:
-    from lightpen_app.steps.review.images_panel import ImagesPanel
-    from lightpen_app.steps.review.plots_panel import PlotsPanel
 
 
 class DetailTabs(QTabWidget):
     """Shows the solution of a swing; hidden tabs are filled when they are shown."""
 
-    # ImagesPanel: the tab of the images is seen for the first time
-    images_made = Signal(object)
-    # MethodsPanel: the tab of the methods is seen for the first time
-    methods_made = Signal(object)
-
     def __init__(self, run: SwingRun, services: Services) -> None:
         super().__init__()
         self._run = run
-        self._images = LazyWidget(_make_images_panel)
-        self._residuals = LazyWidget(_make_residuals_panel)
-        self._methods: LazyWidget[PlotsPanel] = LazyWidget(_make_methods_panel)
-        self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
-            self._images,
-            self._residuals,
-            LazyWidget(partial(_make_uncertainty_panel, services)),
-            self._methods,
-        )
+        self.images = LazyWidget(ImagesPanel)
+        self._residuals: LazyWidget[PlotsPanel] = LazyWidget(ResidualsPanel)
+        self.methods: LazyWidget[PlotsPanel] = LazyWidget(MethodsPanel)
+        u: LazyWidget[PlotsPanel] = LazyWidget(partial(UncertaintyPanel, services))
+        self._panels = self.images, self._residuals, u, self.methods
         self._tab_of = {panel: PageScroll() for panel in self._panels}
         for panel, tab in self._tab_of.items():
             tab.setWidget(ShrinkingScrollContent(panel))
             self.addTab(tab, "")
 
         # Connections
-        self._images.made.connect(self.images_made)
-        self._methods.made.connect(self.methods_made)
         self.currentChanged.connect(self.fill)
-
-    def set_names(self, images: str, residuals: str, u: str, methods: str) -> None:
-        """Set the titles of the tabs."""
-        names = images, residuals, u, methods
-        for tab, name in zip(self._tab_of.values(), names, strict=True):
-            self.setTabText(self.indexOf(tab), name)
-
-    def images(self) -> "ImagesPanel | None":
-        """Return the images, once they were seen."""
-        return self._images.content_so_far()
 
     def fill(self) -> None:
         """Show the solution in the visible tab, or residuals without a solution."""
@@ -103,7 +84,7 @@ class DetailTabs(QTabWidget):
             if content is not None:
                 content.shut_down()
 
-    def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
+    def _show_solution(self, panel: ImagesPanel | PlotsPanel) -> None:
         solution, failure = self._run.status.solution, self._run.status.failure
         setup, residuals = self._run.status.setup, self._residuals.content_so_far()
         if panel.value() is not solution:
@@ -111,33 +92,6 @@ class DetailTabs(QTabWidget):
             panel.set_value(solution, limit)
         if failure is not None and setup is not None and residuals is not None:
             residuals.set_failed(failure, setup.rig)
-
-
-# Imported here: plots take a fifth of the start time, and the first window has none.
-
-
-def _make_images_panel() -> "ImagesPanel":
-    from lightpen_app.steps.review.images_panel import ImagesPanel
-
-    return ImagesPanel()
-
-
-def _make_residuals_panel() -> "PlotsPanel":
-    from lightpen_app.steps.review.plots_panel import ResidualsPanel
-
-    return ResidualsPanel()
-
-
-def _make_uncertainty_panel(services: Services) -> "PlotsPanel":
-    from lightpen_app.steps.review.plots_panel import UncertaintyPanel
-
-    return UncertaintyPanel(services)
-
-
-def _make_methods_panel() -> "PlotsPanel":
-    from lightpen_app.steps.review.plots_panel import MethodsPanel
-
-    return MethodsPanel()
 
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
@@ -149,7 +103,9 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     # px; then tip and buttons are in the first tab, too
     narrow_below, low_below = 112 * GRID, 60 * GRID
 
-    def __init__(self, run: SwingRun, services: Services = ()) -> None:
+    def __init__(
+        self, run: SwingRun, place: SavePlace, services: Services = ()
+    ) -> None:
         super().__init__()
         self._can_verify = bool(verify_step(services))
 
@@ -178,7 +134,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
                 "Reinstate the previous result. Both results stay in the archive."
             ),
         )
-        self.tools = ResultTools(export_formats(services))
+        self.tools = ResultTools(run, place, services)
         self.tabs = self.say(DetailTabs(run, services), self.tr("Details"))
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
@@ -194,6 +150,14 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         fill(layout, self.reason, self.withdrawal, self.solving, self._messages)
         fill(layout, (self.tabs, 1))
         self.tabs.insertTab(0, self._scroll, "")
+        names = (
+            self.tr("Result"),
+            self.tr("Images"),
+            self.tr("Residuals"),
+            self.tr("Uncertainty"),
+            self.tr("Two-stage"),
+        )
+        self.say_items(self.tabs, names)
         self.tabs.setCurrentIndex(0)
         self._use_room()
 
@@ -202,13 +166,13 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.withdrawal.declined.connect(self.tabs.setFocus)
         self.question.declined.connect(self.tabs.setFocus)
 
-        self._retranslate()
+        self._refresh()
 
     def set_state(self, state: ReviewPageState) -> None:
         """Show the state of a swing."""
         self._banner.set_value(state.banner)
         self._messages.set_value(state.remarks)
-        images = self.tabs.images()
+        images = self.tabs.images.content_so_far()
         if images is not None:
             images.set_locked(state.why_locked)
         self.capture_more.set_why_not(
@@ -235,14 +199,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.withdrawal.hide()
 
     @override
-    def _retranslate(self) -> None:
-        self.tabs.setTabText(0, self.tr("Result"))
-        self.tabs.set_names(
-            self.tr("Images"),
-            self.tr("Residuals"),
-            self.tr("Uncertainty"),
-            self.tr("Two-stage"),
-        )
+    def _refresh(self) -> None:
         self.reason.set_words(
             self.tr("This result needs checking. Enter the reason for accepting it."),
             self.tr("Reason"),

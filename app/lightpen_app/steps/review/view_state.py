@@ -1,6 +1,7 @@
 """View state of the step Review."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 from PySide6.QtCore import QCoreApplication
 
@@ -98,25 +99,15 @@ def review_page_state(
     )
 
 
+_SHOWN = attrgetter(
+    *("solution", "failure", "assessment", "result"),
+    *("activity", "is_capturing", "pressed"),
+)
+
+
 def differs(before: SwingStatus, now: SwingStatus) -> bool:
     """Return whether two statuses give different reviews."""
-    return (
-        before.solution,
-        before.failure,
-        before.assessment,
-        before.result,
-        before.activity,
-        before.is_capturing,
-        before.pressed,
-    ) != (
-        now.solution,
-        now.failure,
-        now.assessment,
-        now.result,
-        now.activity,
-        now.is_capturing,
-        now.pressed,
-    )
+    return bool(_SHOWN(before) != _SHOWN(now))
 
 
 def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:

@@ -222,7 +222,7 @@ class DayView(Translated, QWidget):
         self._which.activated.connect(self._on_narrowed)
         self._table.selectionModel().currentRowChanged.connect(self._on_row_changed)
 
-        self._retranslate()
+        self._refresh()
 
     def first_control(self) -> QWidget:
         """Return the field that has the focus at first."""
@@ -331,5 +331,5 @@ class DayView(Translated, QWidget):
                 self.tip_chosen.emit(row.pen, row.tip)
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._fill()

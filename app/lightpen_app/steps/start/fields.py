@@ -46,11 +46,7 @@ class ItemButton(Translated, PushButton):
         # Connections
         self._menu.aboutToShow.connect(self._fill)
 
-        self._retranslate()
-
-    def choices(self) -> tuple[ItemChoice, ...]:
-        """Return the choices."""
-        return self._choices
+        self._refresh()
 
     def set_choices(self, choices: Sequence[ItemChoice]) -> None:
         """Set the selectable items; an open list is kept."""
@@ -75,7 +71,7 @@ class ItemButton(Translated, PushButton):
             lambda _=False: self.library_requested.emit()
         )
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._fill()
 
 
@@ -179,7 +175,7 @@ class PointField(Translated, QWidget):
             field.value_changed.connect(self.value_changed)
 
         self._coordinates.hide()
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> FloatArray | None:
         """Return the point (3,), mm; None for the point of the LED file."""
@@ -198,7 +194,7 @@ class PointField(Translated, QWidget):
     def set_point_of_file(self, point: FloatArray | None) -> None:
         """Show the point of the LED file; None without one."""
         self._of_file = point
-        self._retranslate()
+        self._refresh()
 
     def settle(self) -> None:
         """Apply pending input."""
@@ -217,7 +213,7 @@ class PointField(Translated, QWidget):
             self.blockSignals(blocked)
         self.value_changed.emit()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         if self._of_file is None:
             text = self.tr("As in the LED file")
         else:

@@ -148,10 +148,6 @@ class NamesForm(Translated, QWidget):
         """List the items of the library that can be chosen."""
         self._lists[kind].set_choices(choices)
 
-    def list_of(self, kind: ItemKind) -> ItemButton:
-        """Return the button that lists pens, tips or cones."""
-        return self._lists[kind]
-
     def nominal_tip(self) -> FloatArray | None:
         """Return the nominal centre of the tip (3,), mm; None for the LED file's."""
         return self._nominal_tip.value()

@@ -125,10 +125,6 @@ class InterruptedPanel(Translated, QGroupBox):
         super().resizeEvent(event)
         self._hold_rows()
 
-    def rows(self) -> tuple[InterruptedRow, ...]:
-        """Return the rows."""
-        return tuple(self._rows)
-
     def set_waiting(self, why: str) -> None:
         """Disable the buttons for a reason, or enable them for none."""
         self._why_waiting = why

@@ -115,7 +115,7 @@ class ItemForm(Translated, QWidget):
         for day in (self._due, self._certified):
             day.textChanged.connect(self.value_edited)
 
-        self._retranslate()
+        self._refresh()
 
     def value(self) -> AnyItem:
         """Return the item in the form."""
@@ -174,7 +174,7 @@ class ItemForm(Translated, QWidget):
             self._change.set_value(item.max_change_mm or 0.0)
             self._days.set_value(item.max_days or 0)
             self._nominal.set_value(item.nominal_tip)
-        self._retranslate()
+        self._refresh()
 
     def focus_first(self) -> None:
         """Put the keyboard into the first field that can be changed."""
@@ -192,7 +192,7 @@ class ItemForm(Translated, QWidget):
     def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
         add_labelled(grid, self._labels[field], field, at=at)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._shape.setItemText(0, self.tr("Not specified"))
         for index, shape in enumerate(ArtefactKind, start=1):
             self._shape.setItemText(index, worded(KIND_WORDS[shape]))

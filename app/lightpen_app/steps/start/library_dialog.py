@@ -145,16 +145,16 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         # Connections
         self._tabs.currentChanged.connect(self._on_kind_changed)
         self._retired.toggled.connect(self._fill)
-        self._table.selectionModel().currentRowChanged.connect(self._refresh)
+        self._table.selectionModel().currentRowChanged.connect(self._refresh_buttons)
         self._table.doubleClicked.connect(self._on_double_clicked)
         self._add.clicked.connect(lambda: self.add(""))
         self._retire.clicked.connect(self._on_retire_clicked)
         self._close.clicked.connect(self.accept)
-        self.form.value_edited.connect(self._refresh)
-        self._supervisor.value_edited.connect(self._refresh)
+        self.form.value_edited.connect(self._refresh_buttons)
+        self._supervisor.value_edited.connect(self._refresh_buttons)
 
         self._stop_editing()
-        self._retranslate()
+        self._refresh()
 
     @override
     def reject(self) -> None:
@@ -202,7 +202,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             return False
         self._asked = None
         self._fault.set_value(StatusMessage.fault(fault))
-        self._refresh()
+        self._refresh_buttons()
         return True
 
     def current(self) -> AnyItem | None:
@@ -223,7 +223,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
                     self._table.selectRow(self._model.rowCount() - 1)
         if self.current() is None:
             self._table.selectRow(0)
-        self._refresh()
+        self._refresh_buttons()
 
     def _row(self, item: AnyItem) -> list[QStandardItem]:
         status, due = self._statuses.of_item(item.kind, item.id), item.due
@@ -267,20 +267,20 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._fault.set_value(StatusMessage())
         self._list.hide()  # both are too high for a low screen
         self._panel.show()
-        self._refresh()
+        self._refresh_buttons()
         self.resize(self.width(), self.sizeHint().height())
 
     def _stop_editing(self) -> None:
         self._item = self._asked = None
         self._panel.hide()
         self._list.show()
-        self._refresh()
+        self._refresh_buttons()
         self.resize(self.width(), self.sizeHint().height())
 
     def _on_kind_changed(self) -> None:
         self._stop_editing()
         self._fill()
-        self._retranslate()
+        self._refresh()
 
     def _on_edit_clicked(self) -> None:
         item = self.current()
@@ -322,10 +322,10 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._asked = RequestedChange(
             item, self._is_new, reason, signature, self._before
         )
-        self._refresh()
+        self._refresh_buttons()
         self.change_asked.emit(self._asked)
 
-    def _refresh(self) -> None:
+    def _refresh_buttons(self) -> None:
         item = self.current()
         nothing = "" if item is not None else self.tr("Select an item in the table.")
         is_retired = item is not None and item.is_retired
@@ -354,7 +354,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._leave.set_why_not(is_asked)
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         is_tips = self.kind() is ItemKind.TIP
         for column, width in enumerate(WIDTHS):
             self._table.setColumnWidth(column, width * GRID)

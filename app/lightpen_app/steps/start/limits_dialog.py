@@ -102,7 +102,6 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._buttons.rejected.connect(self.reject)
 
         self.set_value(self._value, is_guarded=False)
-        self._retranslate()
 
     def value(self) -> StationLimits:
         """Return the limits as they are typed."""
@@ -119,7 +118,6 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._new_password.setVisible(is_guarded)
         self._is_signed = False
         self._fault.set_value(StatusMessage())
-        self._retranslate()
         self._refresh()
 
     def show_fault(self, fault: str) -> None:
@@ -127,9 +125,6 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._is_signed = False
         self._fault.set_value(StatusMessage.fault(fault))
         self._supervisor.clear_password()
-
-    def _refresh(self) -> None:
-        self._save.setEnabled(self._supervisor.is_filled() and not self._is_signed)
 
     def _on_entered(self) -> None:
         if self._save.isEnabled():
@@ -150,7 +145,8 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self.signed.emit(limits, self._supervisor.value(), new)
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
+        self._save.setEnabled(self._supervisor.is_filled() and not self._is_signed)
         self._signing.setText(
             self.tr("Sign with the supervisor password.")
             if self._is_guarded

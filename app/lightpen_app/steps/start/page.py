@@ -81,16 +81,16 @@ class StartPage(ResponsiveLayout, Page):
         self._day.setup_requested.connect(self.show_setup)
         self._control.changed.connect(self.changed)
         self._control.step_requested.connect(self.step_requested)
-        self._entries.edited.connect(self._refresh)
+        self._entries.edited.connect(self._show_entries)
         self._unfinished.step_requested.connect(self.step_requested)
         self._last.verification_requested.connect(self._entries.settle)
         self._last.verification_requested.connect(lambda: show(verify))
         workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
-        workbench.library.changed.connect(self._refresh)
+        workbench.library.changed.connect(self._show_entries)
         workbench.selection.changed.connect(self._on_selected)
 
         self._use_room()
-        self._retranslate()
+        self._refresh()
 
     @property
     def is_day(self) -> bool:
@@ -182,7 +182,7 @@ class StartPage(ResponsiveLayout, Page):
             self._setup.set_more(True)
         if self.isVisible():
             self._setup.names.focus_missing_input(first)
-        self._refresh()
+        self._show_entries()
 
     def show_welcome(self) -> None:
         """Show how to begin."""
@@ -193,7 +193,7 @@ class StartPage(ResponsiveLayout, Page):
         control = self.first_control()
         if control is not None and self.isVisible():
             control.setFocus()
-        self._refresh()
+        self._show_entries()
 
     @override
     def _use_room(self) -> None:
@@ -209,14 +209,14 @@ class StartPage(ResponsiveLayout, Page):
             self._unfinished.search()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._begin.refresh()
         self._last.show_status()
         self._library.refresh()
         self._control.refresh()
-        self._refresh()
+        self._show_entries()
 
-    def _refresh(self) -> None:
+    def _show_entries(self) -> None:
         self._setup.set_why_not_done(self._entries.why_not_on())
         self.changed.emit()
 
@@ -229,4 +229,4 @@ class StartPage(ResponsiveLayout, Page):
             self._library.refresh()
         if not before.names.station and not now.start_missing_inputs():
             self.show_day()  # the station is known from before
-        self._refresh()
+        self._show_entries()

@@ -96,19 +96,19 @@ class LastResultPanel(Translated, QGroupBox):
         self._withdrawal.given.connect(self._on_given)
         self._withdrawal.declined.connect(self._take_back.setFocus)
 
-        self._retranslate()
+        self._refresh()
 
     def set_value(self, value: LastResult) -> None:
         """Show another result, or why there is none."""
         self._value = value
         self._withdrawal.hide()
-        self._retranslate()
+        self._refresh()
 
     def set_rule(self, rule: DueRule) -> None:
         """Set the calibration interval."""
         if rule != self._rule:
             self._rule = rule
-            self._retranslate()
+            self._refresh()
 
     def set_status(self, status: TipStatus | None) -> None:
         """Mark a tip that must not be used for measuring; None if unknown."""
@@ -134,7 +134,7 @@ class LastResultPanel(Translated, QGroupBox):
         lines += [remark.value().text for remark in remarks]
         return tuple(filter(None, lines))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         value = self._value
         self.setTitle(
             self.tr("Last practice with this pen and tip")

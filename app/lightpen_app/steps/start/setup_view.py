@@ -71,17 +71,17 @@ class DataFolderPanel(Translated, QGroupBox):
         self._open.clicked.connect(self._on_open_clicked)
         self._change.clicked.connect(self.change_requested)
 
-        self._retranslate()
+        self._refresh()
 
     def set_fault(self, fault: str) -> None:
         """Show why the folder cannot be written; an empty text ends it."""
         self._fault = fault
-        self._retranslate()
+        self._refresh()
 
     def _on_open_clicked(self) -> None:
         self._notices.show_status(open_folder(self._folder))
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._change.setProperty("inviting", bool(self._fault))
         self._change.style().polish(self._change)
         doubt = StatusMessage.fault(breakable(self._fault))
@@ -193,7 +193,7 @@ class WelcomeView(Translated, QWidget):
         self._images.clicked.connect(self._on_images_clicked)
         self._station.clicked.connect(self.station_requested)
 
-        self._retranslate()
+        self._refresh()
 
     def set_narrow(self, narrow: bool) -> None:
         """Use smaller pictures where there is little width."""
@@ -215,7 +215,7 @@ class WelcomeView(Translated, QWidget):
             "move is the tip centre."
         )
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self.trial.set_words(
             self.tr("Try it with a simulated pen"),
             self.tr("The whole procedure without pen, camera or any entry."),

@@ -78,7 +78,7 @@ class SwingPage(Page):
         self._showing.timeout.connect(self._show)
         self._plotting.timeout.connect(self._plot)
 
-        self._retranslate()
+        self._refresh()
 
     @override
     def is_complete(self) -> bool:
@@ -150,7 +150,7 @@ class SwingPage(Page):
         self._showing.stop()
 
     @override
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._show()
 
     def _missing_input(self) -> str:

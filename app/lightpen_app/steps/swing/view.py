@@ -83,7 +83,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._banner = StateBanner(TextSize.TITLE)
         self._image = ImageView()
         self._image.setMinimumWidth(LEAST_IMAGE)
-        self._plots = LazyWidget(_make_plots)
+        self._plots = LazyWidget(SwingPlots)
 
         # Layout
         self._content = ShrinkingScrollContent()
@@ -114,7 +114,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
         self._verdict.hide()
         self._use_room()
-        self._retranslate()
+        self._refresh()
 
     def set_value(
         self, value: OperatorValue, note: str = "", *, is_verdict: bool = False
@@ -150,7 +150,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         """Return the plots."""
         return self._plots.content()
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         self._image.set_message(self.tr("No image yet"))
 
     @property
@@ -198,13 +198,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
     def _hold_first_row(self, height: int) -> None:
         """Keep the dial and its neighbours fully visible above the plots."""
         self._body.setRowMinimumHeight(0, height if self._is_small else 0)
-
-
-def _make_plots() -> "SwingPlots":
-    # Imported here: plots take a fifth of the start time, and the first window has
-    # none.
-
-    return SwingPlots()
 
 
 LEAST_HEIGHT = 15 * GRID
@@ -285,7 +278,7 @@ class SwingPlots(Translated, QWidget):
         self._choice.currentChanged.connect(self._on_choice_changed)
 
         self._on_choice_changed()
-        self._retranslate()
+        self._refresh()
 
     def plots(self) -> tuple[TracePlot, ...]:
         """Return the plots: misfit, uncertainty, scatter and estimate."""
@@ -298,7 +291,7 @@ class SwingPlots(Translated, QWidget):
         """
         if self._limit != MICROMETRES * max_uncertainty:
             self._limit = MICROMETRES * max_uncertainty
-            self._retranslate()
+            self._refresh()
         self._turn = (self._turn + 1) % N_SHOWN
         trace = self._traces[N_SHOWN * self._choice.currentIndex() + self._turn]
         if trace.shown is not state:
@@ -332,7 +325,7 @@ class SwingPlots(Translated, QWidget):
         changes = MICROMETRES * (trace.tips - trace.tips[-1:])
         self._traces[3].plot.set_data(trace.n_images.astype(np.float64), *changes.T)
 
-    def _retranslate(self) -> None:
+    def _refresh(self) -> None:
         words = "" if self._limit is None else f"{self._limit:g}"
         limit = self.tr("limit {0} \u00b5m").format(words)
         plot = self._traces[1].plot

@@ -8,6 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.detection.inspection import Exposure, Inspection
 from lightpen_app.steps.camera.exposure_panel import FocusPanel
+from lightpen_app.widgets.state_banner import SignLabel
 
 NONE = np.zeros(0, np.int64)
 
@@ -34,11 +35,11 @@ def test_the_last_width_is_judged(
     for width in widths:
         panel.add(Inspection(Exposure(), width, NONE))
 
-    assert panel.verdict() == verdict
-    assert panel.number() == number
+    assert panel.findChildren(SignLabel)[0].value().text == verdict
+    assert panel._number.text() == number
 
 
 def test_saturated_leds_are_not_called_sharp(panel: FocusPanel) -> None:
     panel.add(Inspection(Exposure((1.0,)), 0.8, NONE))
 
-    assert panel.verdict() == "Saturated"
+    assert panel.findChildren(SignLabel)[0].value().text == "Saturated"

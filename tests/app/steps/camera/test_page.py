@@ -207,16 +207,16 @@ def test_a_rig_file_that_cannot_be_read_is_reported_where_it_was_chosen(
     panel = live.child(RigPanel)
     panel.path_chosen.emit(str(tmp_path / "rig.json"))
 
-    live.until(lambda: "cameras" in panel.problem().text)
-    assert panel.problem().tone is Tone.BAD
+    live.until(lambda: "cameras" in panel._problem.value().text)
+    assert panel._problem.value().tone is Tone.BAD
     assert workbench.selection.preparation.rig_file is not None
     assert "remains in use: Baseline" in live.words
 
     workbench.selection.changed.emit(workbench.selection.preparation)
-    assert "cameras" in panel.problem().text
+    assert "cameras" in panel._problem.value().text
 
     ask_for_second(live)
-    assert not panel.problem().text
+    assert not panel._problem.value().text
 
 
 def test_cameras_out_of_step_are_reported_with_what_that_costs(live: "Seen") -> None:
@@ -239,9 +239,9 @@ def test_each_led_has_a_ring_with_its_number(live: "Seen") -> None:
 
 def test_leds_rate_and_size_stand_above_the_image(live: "Seen", qtbot: QtBot) -> None:
     panel = live.child(LivePanel)
-    qtbot.waitUntil(lambda: panel.figures().endswith("1224 x 1024 px"))
+    qtbot.waitUntil(lambda: panel._figures.text().endswith("1224 x 1024 px"))
 
-    assert panel.figures().startswith("10 of 10 LEDs")
+    assert panel._figures.text().startswith("10 of 10 LEDs")
 
 
 def test_spots_that_are_no_leds_are_dashed(
@@ -284,8 +284,8 @@ def test_images_are_taken_only_while_the_page_is_shown(
 def test_a_sharp_image_has_narrow_rims(live: "Seen") -> None:
     panel = live.child(FocusPanel)
 
-    live.until(lambda: 1 < float(panel.number().partition(" ")[0] or 0) < 3)
-    assert panel.verdict() == "In focus"
+    live.until(lambda: 1 < float(panel._number.text().partition(" ")[0] or 0) < 3)
+    assert panel._verdict.value().text == "In focus"
 
 
 # Exposure and gain

@@ -67,9 +67,9 @@ def asked(
 def test_the_ranges_are_those_of_the_camera(panel: SettingsPanel) -> None:
     rate, width = field(panel, "Frame rate"), field(panel, "Region width")
 
-    assert (rate.limits()[0], rate.limits()[1], rate.value()) == (0.5, 60, 20)
-    assert (width.limits()[0], width.limits()[1], width.value()) == (8, 2448, 640)
-    assert field(panel, "Region from left").limits()[1] == 2448 - 640
+    assert (*rate._limits, rate.value()) == (0.5, 60, 20)
+    assert (*width._limits, width.value()) == (8, 2448, 640)
+    assert field(panel, "Region from left")._limits[1] == 2448 - 640
 
 
 def test_each_change_asks_for_nothing_else(qtbot: QtBot, panel: SettingsPanel) -> None:

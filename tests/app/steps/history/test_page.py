@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
-from tests.app.pictures import data_of
+from tests.app.pictures import data_of, ranges_of
 from tests.app.room import scrolled_sideways
 from typing_extensions import override
 
@@ -61,6 +61,7 @@ from lightpen_app.steps.history.history_table import (
 )
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.widgets.fields import DateField
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
@@ -214,6 +215,10 @@ class Desk:
         dialog.close()
 
 
+def remarks_of(panel: ArchivePanel) -> list[str]:
+    return [label.value().text for label in panel.findChildren(SignLabel)]
+
+
 @pytest.fixture
 def desk(workbench: Workbench, qtbot: QtBot) -> Iterator[Desk]:
     desk = Desk(workbench, qtbot)
@@ -255,6 +260,7 @@ def test_a_column_that_is_not_wanted_stays_hidden(desk: Desk) -> None:
     (table,) = again.findChildren(HistoryTable)
     assert table.hidden_columns() == (TIP,)
     again.shut_down()
+    QThreadPool.globalInstance().waitForDone()
 
 
 def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_apart(
@@ -338,7 +344,7 @@ def test_a_server_that_cannot_be_reached_is_reported_without_the_password(
 
     def reported() -> str:
         desk.page.entered()
-        return panel.messages()[0].text
+        return remarks_of(panel)[0]
 
     desk.until(lambda: "Entries not yet on the server;" in reported())
     assert "The archive postgresql" in reported()
@@ -428,8 +434,8 @@ def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     x, _, _, u = panel.plots()
     assert list(data_of(x, pg.PlotCurveItem)[1]) == [0.0, 1.0, 2.0, 3.0]
     assert list(data_of(u, pg.PlotCurveItem)[1]) == [0.0061] * 4
-    assert [plot.marked() for plot in panel.plots()] == [3] * 4
-    (left, right), (low, high) = u.ranges()
+    assert [data_of(p, pg.ScatterPlotItem, 1)[0] for p in panel.plots()] == [[3]] * 4
+    (left, right), (low, high) = ranges_of(u)
     assert left < 1 < 10 < right  # so few are not numbered in fractions
     assert low < 0.0061 < 0.012 < high  # the limit is in sight
     assert panel.words().startswith("Pen LP-04, tip T-10: 4 calibrations, 2026-01-02")
@@ -584,9 +590,9 @@ def test_a_check_tells_notes_that_prove_no_change(desk: Desk) -> None:
     desk.show_tab(WHOLE)
     desk.click("Check the archive")
     panel = desk.child(ArchivePanel)
-    desk.until(lambda: panel.checked() is not None)
+    desk.until(lambda: panel.found is not None)
 
-    reported = " ".join(remark.text for remark in panel.messages())
+    reported = " ".join(remarks_of(panel))
     assert "No changes in 2 entries" in reported
     assert "library/000001.json is not entered in the archive" in reported
 
@@ -599,8 +605,8 @@ def test_a_check_that_is_cancelled_leaves_the_one_before(
     desk.show_tab(WHOLE)
     desk.click("Check the archive")
     panel = desk.child(ArchivePanel)
-    desk.until(lambda: panel.checked() is not None)
-    before = panel.checked()
+    desk.until(lambda: panel.found is not None)
+    before = panel.found
     desk.until(lambda: not panel.progress.is_running)
     may_begin = hold_back("lightpen_app.steps.history.archive_panel.check_archive")
 
@@ -611,7 +617,7 @@ def test_a_check_that_is_cancelled_leaves_the_one_before(
     QThreadPool.globalInstance().waitForDone()
     QApplication.processEvents()
 
-    assert panel.checked() is before
+    assert panel.found is before
     assert not panel.progress.is_running
 
 
@@ -723,7 +729,7 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
     desk.show_tab(WHOLE)
     desk.click("Check the archive")
     desk.until(desk.page.is_doubtful)
-    reported = [remark.text for remark in desk.child(ArchivePanel).messages()]
+    reported = remarks_of(desk.child(ArchivePanel))
     assert any("Entry 2 of chain" in text for text in reported)
 
 

@@ -402,11 +402,11 @@ def test_the_nominal_tip_of_the_first_step_is_reported_where_it_rules(
 def test_row_and_disc_are_chosen_together(seen: "Seen") -> None:
     view = seen.child(PenView)
     led_table(seen).set_chosen(4)
-    assert view.chosen() == 4
+    assert view._chosen == 4
 
     place = view.place_of(7).toPoint()
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=place)
-    assert (led_table(seen).chosen(), view.chosen()) == (7, 7)
+    assert (led_table(seen).currentRow(), view._chosen) == (6, 7)
 
 
 # The live match
@@ -654,9 +654,9 @@ def test_what_is_wrong_is_reported_in_the_language_that_is_chosen(
 ) -> None:
     open_file(seen, write_table(tmp_path / "exchanged.csv", exchanged()))
     panel = seen.child(LedFilePanel)
-    english = panel.problem()
+    english = panel._problem.value().text
 
     LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
-    assert panel.problem() not in ("", english)
+    assert panel._problem.value().text not in ("", english)

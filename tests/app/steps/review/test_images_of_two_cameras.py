@@ -5,10 +5,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QThreadPool
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import data_of
 
 from lightpen.arrays import FloatArray
 from lightpen.record.swings.reading import open_record
@@ -81,7 +83,7 @@ def test_the_images_of_the_second_camera_are_shown_with_what_it_saw(
         press(panel, f"Camera {camera + 1}")
         expected = seen(solution, camera, 4)
         qtbot.waitUntil(partial(are_ringed, view, expected))
-        assert len(view.arrows().points) == len(expected)
+        assert len(view._arrows.points) == len(expected)
 
 
 def test_the_residuals_over_the_image_are_of_the_camera_that_is_chosen(
@@ -96,7 +98,7 @@ def test_the_residuals_over_the_image_are_of_the_camera_that_is_chosen(
         press(panel, f"Camera {camera + 1}")
         used = solution.calibration.cameras[camera].leds_used
         points = solution.seen_by(camera).seen_pixels[used]
-        starts = np.array([each[::6] for each in arrows.lines()]).T
+        starts = data_of(arrows, pg.PlotCurveItem)[:, ::6].T
         if len(points) > MANY:
             points, _ = cell_means(points, points)
         np.testing.assert_allclose(starts, points)

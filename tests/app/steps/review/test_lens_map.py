@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+import pyqtgraph as pg
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import data_of
 from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.arrays import FloatArray
@@ -47,4 +49,4 @@ def test_the_lens_field_is_mapped_where_the_images_support_one(qtbot: QtBot) -> 
     plot = card.plot
     assert isinstance(plot, ArrowPlot)
     assert plot.accessibleName().startswith("Lens field")
-    assert len(plot.lines()[0]) > 6
+    assert len(data_of(plot, pg.PlotCurveItem)[0]) > 6

@@ -32,6 +32,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.patience import PATIENCE_MS
+from tests.app.pictures import coordinates_of, data_of
 from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
 from tests.simulated_plans import still_view
@@ -365,7 +366,7 @@ def look_at_all_tabs(page: ReviewPage) -> None:
 
 
 def readout(page: ReviewPage) -> TipValue:
-    value = the(page, TipReadout).value()
+    value = the(page, TipReadout)._value
     assert value is not None
     return value
 
@@ -493,7 +494,7 @@ def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
 ) -> None:
     assert workbench.run.status.solution is not None
     uncertainty = workbench.run.status.solution.calibration.budget.expanded_uncertainty
-    shown = the(page, TipReadout).texts()
+    shown = coordinates_of(the(page, TipReadout))
     for text, value, u in zip(shown, tip(workbench), uncertainty[:3], strict=True):
         number, _, within = text.split()
         assert float(within) == pytest.approx(u, rel=0.05)  # two significant digits
@@ -975,9 +976,9 @@ def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
     assert (
         shown.image_size().width() == workbench.run.status.solution.source.camera.width
     )
-    assert len(shown.arrows().residuals) == len(seen)
-    assert shown.zoom() > 1  # the pen fills the view
-    assert the(page, MisfitPlot).number() == 3
+    assert len(shown._arrows.residuals) == len(seen)
+    assert shown._zoom > 1  # the pen fills the view
+    assert data_of(the(page, MisfitPlot), pg.ScatterPlotItem)[0] == [3]
 
 
 def test_of_images_passed_over_quickly_the_last_is_shown(

@@ -144,8 +144,9 @@ class Opened:
 
     def rows(self) -> tuple[InterruptedRow, ...]:
         (panel,) = self.page.findChildren(InterruptedPanel)
-        assert panel.isVisibleTo(self.page) is bool(panel.rows())
-        return panel.rows()
+        rows = panel.findChildren(InterruptedRow)
+        assert panel.isVisibleTo(self.page) is bool(rows)
+        return tuple(rows)
 
     def buttons(self) -> list[str]:
         """Return what can be pressed of the swings and below."""
@@ -677,11 +678,11 @@ def test_the_page_is_there_before_the_swings_are_looked_for(
     QThreadPool.globalInstance().waitForDone()
     QApplication.processEvents()
     (panel,) = page.findChildren(InterruptedPanel)
-    assert panel.rows() == ()
+    assert panel.findChildren(InterruptedRow) == []
 
     page.show()
 
-    qtbot.wait_until(lambda: len(panel.rows()) == 1)
+    qtbot.wait_until(lambda: len(panel.findChildren(InterruptedRow)) == 1)
     page.shut_down()
 
 
