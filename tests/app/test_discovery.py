@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 from tests.simulated_stations import random_station
 
+from lightpen_app.face import Service
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.work.workbench import Workbench
@@ -19,8 +20,16 @@ if TYPE_CHECKING:
     from tests.app.conftest import HoldBack
 
 
-def test_both_panels_without_a_file_ask_for_the_swing(qtbot: QtBot) -> None:
-    for panel in (IntrinsicsPanel(), LedFilePanel()):
+class Discovering(Service):
+    discovers = True
+
+
+def test_both_panels_without_a_file_ask_for_the_swing(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    services = (Discovering(workbench),)
+    intrinsics = IntrinsicsPanel(workbench.selection, services)
+    for panel in (intrinsics, LedFilePanel()):
         qtbot.addWidget(panel)
         button = next(
             each

@@ -423,10 +423,6 @@
 <context>
     <name>DayControl</name>
     <message>
-        <source>Swing tip {0}</source>
-        <translation>摆动测头 {0}</translation>
-    </message>
-    <message>
         <source>Check the camera</source>
         <translation>检查相机</translation>
     </message>
@@ -441,14 +437,6 @@
     <message>
         <source>Verify the tip</source>
         <translation>验证测头</translation>
-    </message>
-    <message>
-        <source>Choose a tip in the table, or clear the search.</source>
-        <translation>请在表中选择测头，或清除搜索内容。</translation>
-    </message>
-    <message>
-        <source>No tip matches {0}. Press Enter, or clear the search.</source>
-        <translation>没有与 {0} 匹配的测头。请按回车键，或清除搜索内容。</translation>
     </message>
 </context>
 <context>
@@ -623,6 +611,18 @@
     <message>
         <source>Set up station...</source>
         <translation>设置工位…</translation>
+    </message>
+    <message>
+        <source>Swing tip {0}</source>
+        <translation>摆动测头 {0}</translation>
+    </message>
+    <message>
+        <source>Choose a tip in the table, or clear the search.</source>
+        <translation>请在表中选择测头，或清除搜索内容。</translation>
+    </message>
+    <message>
+        <source>No tip matches {0}. Press Enter, or clear the search.</source>
+        <translation>没有与 {0} 匹配的测头。请按回车键，或清除搜索内容。</translation>
     </message>
 </context>
 <context>
@@ -1335,6 +1335,33 @@
 <context>
     <name>InterruptedControl</name>
     <message>
+        <source>Reading the verification</source>
+        <translation>正在读取验证</translation>
+    </message>
+    <message>
+        <source>Closing the verification</source>
+        <translation>正在结束验证</translation>
+    </message>
+    <message>
+        <source>Verification closed as abandoned. See History.</source>
+        <translation>验证已作为放弃结束。见“历史”。</translation>
+    </message>
+</context>
+<context>
+    <name>InterruptedPanel</name>
+    <message>
+        <source>A resumed swing keeps its images and its files.</source>
+        <translation>继续时保留全部图像和原来的文件。</translation>
+    </message>
+    <message>
+        <source>Search again</source>
+        <translation>重新查找</translation>
+    </message>
+    <message>
+        <source>Keep</source>
+        <translation>保留</translation>
+    </message>
+    <message>
         <source>In use by another program</source>
         <translation>另一程序正在使用</translation>
     </message>
@@ -1385,33 +1412,6 @@
     <message>
         <source>Swing discarded. The images remain in {0}.</source>
         <translation>摆动已放弃。图像保留在 {0}。</translation>
-    </message>
-    <message>
-        <source>Reading the verification</source>
-        <translation>正在读取验证</translation>
-    </message>
-    <message>
-        <source>Closing the verification</source>
-        <translation>正在结束验证</translation>
-    </message>
-    <message>
-        <source>Verification closed as abandoned. See History.</source>
-        <translation>验证已作为放弃结束。见“历史”。</translation>
-    </message>
-</context>
-<context>
-    <name>InterruptedPanel</name>
-    <message>
-        <source>A resumed swing keeps its images and its files.</source>
-        <translation>继续时保留全部图像和原来的文件。</translation>
-    </message>
-    <message>
-        <source>Search again</source>
-        <translation>重新查找</translation>
-    </message>
-    <message>
-        <source>Keep</source>
-        <translation>保留</translation>
     </message>
     <message>
         <source>Interrupted: {0}</source>
@@ -1712,6 +1712,10 @@
         <translation>恢复使用前一结果。两个结果都保留在档案库中。</translation>
     </message>
     <message>
+        <source>Last calibration not available</source>
+        <translation>无法显示上次标定</translation>
+    </message>
+    <message>
         <source>No result yet</source>
         <translation>尚无结果</translation>
     </message>
@@ -1746,13 +1750,6 @@
     <message>
         <source>In the future</source>
         <translation>日期在将来</translation>
-    </message>
-</context>
-<context>
-    <name>LastResultPresenter</name>
-    <message>
-        <source>Last calibration not available</source>
-        <translation>无法显示上次标定</translation>
     </message>
 </context>
 <context>
@@ -2272,13 +2269,6 @@
     <message>
         <source>Pen tip calibration</source>
         <translation>光笔测头标定</translation>
-    </message>
-</context>
-<context>
-    <name>MaskControl</name>
-    <message>
-        <source>stray</source>
-        <translation>杂散光</translation>
     </message>
 </context>
 <context>
@@ -3951,6 +3941,10 @@
         <translation>清除屏蔽</translation>
     </message>
     <message>
+        <source>stray</source>
+        <translation>杂散光</translation>
+    </message>
+    <message>
         <source>No images are received.</source>
         <translation>没有收到图像。</translation>
     </message>
@@ -4805,13 +4799,6 @@
     </message>
 </context>
 <context>
-    <name>WelcomeControl</name>
-    <message>
-        <source>A swing is in progress.</source>
-        <translation>摆动正在进行。</translation>
-    </message>
-</context>
-<context>
     <name>WelcomeView</name>
     <message>
         <source>Folder of the recorded images</source>
@@ -4844,6 +4831,10 @@
     <message>
         <source>Enter pen and tip, and choose the camera.</source>
         <translation>输入光笔和测头，并选择相机。</translation>
+    </message>
+    <message>
+        <source>A swing is in progress.</source>
+        <translation>摆动正在进行。</translation>
     </message>
 </context>
 <context>

@@ -172,7 +172,7 @@ def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> Non
 
     misfits.set_data(np.array([1, 2]), np.array([0.1, 0.2]), np.array([True, False]))
 
-    assert data_of(misfits, pg.ScatterPlotItem).T.tolist() == [[2, 0.2]]
+    assert data_of(misfits, pg.ScatterPlotItem).T.tolist() == [[2, pytest.approx(0.16)]]
     misfits.set_number(None)
     assert data_of(misfits, pg.ScatterPlotItem).size == 0
 

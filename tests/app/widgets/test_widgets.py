@@ -29,6 +29,7 @@ from lightpen_app.widgets.state_banner import (
     StateBanner,
     StatusMessage,
 )
+from lightpen_app.work.workbench import Workbench
 
 
 @pytest.mark.parametrize(
@@ -41,9 +42,9 @@ from lightpen_app.widgets.state_banner import (
     ],
 )
 def test_the_exposure_is_judged_in_words(
-    qtbot: QtBot, peaks: tuple[float, ...], words: str
+    qtbot: QtBot, workbench: Workbench, peaks: tuple[float, ...], words: str
 ) -> None:
-    bar = ExposurePanel()
+    bar = ExposurePanel(workbench.live)
     qtbot.addWidget(bar)
 
     bar.set_value(Exposure(peaks))
@@ -51,8 +52,10 @@ def test_the_exposure_is_judged_in_words(
     assert bar.verdict().text == words
 
 
-def test_what_may_be_no_led_is_not_called_one(qtbot: QtBot) -> None:
-    bar = ExposurePanel()
+def test_what_may_be_no_led_is_not_called_one(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    bar = ExposurePanel(workbench.live)
     qtbot.addWidget(bar)
 
     bar.set_value(Exposure((0.5, 0.2), are_leds=False))

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QLabel
 
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
@@ -39,14 +39,10 @@ EXPOSURE_WIDTH, GAIN_WIDTH = 100, 88  # px, at least: of "30.00 ms" and "24.0 dB
 class ExposurePanel(Translated, QFrame):
     """The brightness of the LEDs, the settings that change it, and the advice."""
 
-    exposure_changed = Signal(float)  # asked for, us
-    gain_changed = Signal(float)  # asked for, dB
-    # The program is to set both by the LEDs, or to stop doing so.
-    adjustment_requested = Signal(bool)
-
-    def __init__(self) -> None:
+    def __init__(self, live: LiveView) -> None:
         super().__init__()
         self.setProperty("area", "panel")
+        self._live = live
         self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._adjustment: AutoExposure | None = None
@@ -95,7 +91,7 @@ class ExposurePanel(Translated, QFrame):
 
         # Connections
         self._exposure.value_changed.connect(self._on_exposure_edited)
-        self._gain.value_changed.connect(self.gain_changed)
+        self._gain.value_changed.connect(self._on_gain_edited)
         self._adjust.clicked.connect(self._on_adjust_clicked)
 
         self.set_camera(None, CameraSettings())
@@ -158,11 +154,35 @@ class ExposurePanel(Translated, QFrame):
         self._adjustment = adjustment
         self._refresh()
 
+    def end_adjustment(self) -> None:
+        """Keep the present exposure."""
+        self.set_adjustment(None)
+
+    def adjust(self, seen: LiveImage, inspection: Inspection) -> None:
+        """Continue an adjustment in progress by one more image."""
+        before, caps = self._adjustment, self._live.caps
+        if before is None or caps is None:
+            return
+        self._live.hurry()
+        now = before.after(seen.frame, seen.spots, inspection, caps)
+        exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
+        if exposure_us is not None and exposure_us != before.asked.exposure_us:
+            self._live.set_exposure(exposure_us)
+        if gain_db is not None and gain_db != before.asked.gain_db:
+            self._live.set_gain(gain_db)
+        self.set_adjustment(now)
+
     def _on_exposure_edited(self, exposure_ms: float) -> None:
-        self.exposure_changed.emit(exposure_ms * US_PER_MS)
+        self.end_adjustment()
+        self._live.set_exposure(exposure_ms * US_PER_MS)
+
+    def _on_gain_edited(self, gain_db: float) -> None:
+        self.end_adjustment()
+        self._live.set_gain(gain_db)
 
     def _on_adjust_clicked(self) -> None:
-        self.adjustment_requested.emit(not self._is_adjusting)
+        begins = not self._is_adjusting
+        self.set_adjustment(AutoExposure.begun(self._live.settings) if begins else None)
 
     @property
     def _is_adjusting(self) -> bool:
@@ -351,47 +371,3 @@ class FocusPanel(Translated, QFrame):
         else:
             hint = self.tr("Turn the focus ring until the edge width is smallest.")
         self._hint.setText(hint)
-
-
-class ExposureControl(QObject):
-    """Carries out requests of the exposure panel."""
-
-    def __init__(self, live: LiveView, panel: ExposurePanel) -> None:
-        super().__init__(panel)
-        self._live, self._panel = live, panel
-        self._adjustment: AutoExposure | None = None
-
-        # Connections
-        panel.exposure_changed.connect(self._on_exposure_asked)
-        panel.gain_changed.connect(self._on_gain_asked)
-        panel.adjustment_requested.connect(self._on_adjustment_requested)
-
-    def end_adjustment(self) -> None:
-        """Keep the present exposure."""
-        self._on_adjustment_requested(False)
-
-    def adjust(self, seen: LiveImage, inspection: Inspection) -> None:
-        """Continue an adjustment in progress by one more image."""
-        before, caps = self._adjustment, self._live.caps
-        if before is None or caps is None:
-            return
-        self._live.hurry()
-        self._adjustment = now = before.after(seen.frame, seen.spots, inspection, caps)
-        exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
-        if exposure_us is not None and exposure_us != before.asked.exposure_us:
-            self._live.set_exposure(exposure_us)
-        if gain_db is not None and gain_db != before.asked.gain_db:
-            self._live.set_gain(gain_db)
-        self._panel.set_adjustment(now)
-
-    def _on_exposure_asked(self, exposure_us: float) -> None:
-        self.end_adjustment()
-        self._live.set_exposure(exposure_us)
-
-    def _on_gain_asked(self, gain_db: float) -> None:
-        self.end_adjustment()
-        self._live.set_gain(gain_db)
-
-    def _on_adjustment_requested(self, begins: bool) -> None:
-        self._adjustment = AutoExposure.begun(self._live.settings) if begins else None
-        self._panel.set_adjustment(self._adjustment)

@@ -1,12 +1,13 @@
 """The intrinsics of the camera: file, content and match."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from PySide6.QtCore import QDate, QLocale, QObject, Qt, Signal
+from PySide6.QtCore import QDate, QLocale, Qt, Signal
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -21,7 +22,7 @@ from lightpen.formats.rig_files import write_window
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera, unmodelled_effects_of
 from lightpen.record.swings.solving import Solution
-from lightpen_app.face import Services
+from lightpen_app.face import Services, can_calibrate, can_discover
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
@@ -32,24 +33,25 @@ from lightpen_app.widgets.fields import PathField, Translated
 from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
-from lightpen_app.work.job import LatestJob
-from lightpen_app.work.workbench import Workbench
+from lightpen_app.work.job import LatestJob, Report
+from lightpen_app.work.selection import Selection
 
 FILES = "*.yaml *.yml *.json *.xml *.toml *.cameramodel *.txt"
 N_FACTS = 5
+
+Region: TypeAlias = tuple[int, int, int, int]  # x, y, width and height, px
 
 
 class IntrinsicsPanel(Translated, QGroupBox):
     """Shows the file in use and the size of the live image."""
 
-    path_chosen = Signal(str)  # path of the file to open
-    calibration_requested = Signal()  # calibrate the camera with a board
-    part_requested = Signal()  # the images are binned or cropped
     discovery_requested = Signal()  # no such file: find the camera by a swing
 
-    def __init__(self, can_calibrate: bool = True, can_discover: bool = True) -> None:
+    def __init__(self, selection: Selection, services: Services = ()) -> None:
         super().__init__()
         self.say(self, self.tr("Intrinsics of camera and lens"))
+        self._selection, self._services = selection, services
+        self._reading = LatestJob(self)
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
         self._serial = ""
@@ -60,20 +62,18 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
         self._part = self.make_button(
-            self.tr("Binned or cropped images..."), self.part_requested
+            self.tr("Binned or cropped images..."), self._on_part_clicked
         )
         self._calibrate = self.make_button(
-            self.tr("Calibrate camera..."), self.calibration_requested
+            self.tr("Calibrate camera..."), self._on_calibrate_clicked
         )
         self._discover = self.make_button(
             self.tr("I have no such file..."),
             self.discovery_requested,
             tip=self.tr("Find pen, camera and tip by one swing and one length."),
         )
-        if not can_calibrate:
-            self._calibrate.hide()
-        if not can_discover:
-            self._discover.hide()
+        self._calibrate.setVisible(can_calibrate(services))
+        self._discover.setVisible(can_discover(services))
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()
@@ -110,7 +110,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             grid.addWidget(fact, row, 1)
 
         # Connections
-        self._path.path_chosen.connect(self.path_chosen)
+        self._path.path_chosen.connect(self._read)
+        selection.station_changed.connect(self._forget_file)
         FileDrops(self).dropped.connect(self._path.take)
 
         self._refresh()
@@ -120,7 +121,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         if value is self._file:
             return
         self._file = value
-        self.forget_refused()
+        self._forget_refused()
 
     def set_image_size(self, image_size: tuple[int, int] | None) -> None:
         """Compare with other live images, width and height in px, or with none."""
@@ -140,12 +141,21 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self._swing = swing
             self._refresh()
 
-    def forget_refused(self) -> None:
+    def shut_down(self) -> None:
+        """Cancel reading."""
+        self._reading.cancel()
+
+    def _forget_file(self) -> None:
+        """Clear the message on a file that was chosen at another station."""
+        self._reading.cancel()
+        self._forget_refused()
+
+    def _forget_refused(self) -> None:
         """Show the file in use instead of a refused choice."""
         self._path.set_value("" if self._file is None else str(self._file.path))
-        self.set_problem("")
+        self._set_problem("")
 
-    def set_problem(self, sentence: str) -> None:
+    def _set_problem(self, sentence: str) -> None:
         """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(sentence))
         self._problem.set_value(StatusMessage.fault(sentence))
@@ -157,6 +167,32 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self.tr("Intrinsics of camera and lens"),
             self.tr("Intrinsics files ({0})").format(FILES),
         )
+
+    def _read(self, path: str) -> None:
+        self._start(lambda _: CameraFile.read(Path(path)))
+
+    def _start(self, read: Callable[[Report], CameraFile]) -> None:
+        self._reading.start(read, self._on_file_read, self._set_problem)
+
+    def _on_file_read(self, camera_file: CameraFile) -> None:
+        now = self._selection.preparation
+        self._selection.set_preparation(replace(now, camera_file=camera_file))
+
+    def _on_part_clicked(self) -> None:
+        file = self._selection.preparation.camera_file
+        if file is not None:
+            dialog = PartDialog(file.camera, self)
+            dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            dialog.given.connect(partial(self._on_part_given, file.path))
+            dialog.open()
+
+    def _on_part_given(self, path: Path, binning: int, region: Region) -> None:
+        self._start(lambda _: CameraFile.read(write_window(path, binning, region)))
+
+    def _on_calibrate_clicked(self) -> None:
+        for each in self._services:
+            if each.calibrates_cameras:
+                each.calibrate_camera(self, self._read)
 
     def _refresh(self) -> None:
         camera = None if self._file is None else self._file.camera
@@ -330,70 +366,3 @@ class PartDialog(FittedWindow, Translated, QDialog):
         region = tuple(round(each.value()) for each in self._region)
         self.given.emit(round(self._binning.value()), region)
         self.accept()
-
-
-Region: TypeAlias = tuple[int, int, int, int]  # x, y, width and height, px
-
-
-class IntrinsicsControl(QObject):
-    """Carries out requests of the intrinsics panel."""
-
-    def __init__(
-        self,
-        workbench: Workbench,
-        panel: IntrinsicsPanel,
-        services: Services,
-        page: QWidget,
-    ) -> None:
-        super().__init__(page)
-        self._selection, self._services = workbench.selection, services
-        self._panel = panel
-        self._page = page
-        self._reading = LatestJob(self)
-
-        # Connections
-        workbench.selection.station_changed.connect(self._forget_file)
-        panel.path_chosen.connect(self._on_path_chosen)
-        panel.part_requested.connect(self._on_part_requested)
-        panel.calibration_requested.connect(self._on_calibration_requested)
-
-    def shut_down(self) -> None:
-        """Cancel reading."""
-        self._reading.cancel()
-
-    def _forget_file(self) -> None:
-        """Clear the message on a file that was chosen at another station."""
-        self._reading.cancel()
-        self._panel.forget_refused()
-
-    def _on_path_chosen(self, path: str) -> None:
-        self._reading.start(
-            lambda _: CameraFile.read(Path(path)),
-            self._on_file_read,
-            self._panel.set_problem,
-        )
-
-    def _on_part_requested(self) -> None:
-        file = self._selection.preparation.camera_file
-        if file is None:
-            return
-        dialog = PartDialog(file.camera, self._page)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.given.connect(partial(self._on_part_given, file.path))
-        dialog.open()
-
-    def _on_part_given(self, path: Path, binning: int, region: Region) -> None:
-        self._reading.start(
-            lambda _: CameraFile.read(write_window(path, binning, region)),
-            self._on_file_read,
-            self._panel.set_problem,
-        )
-
-    def _on_calibration_requested(self) -> None:
-        for each in self._services:
-            if each.calibrates_cameras:
-                each.calibrate_camera(self._page, self._on_path_chosen)
-
-    def _on_file_read(self, camera_file: CameraFile) -> None:
-        now = self._selection.preparation
-        self._selection.set_preparation(replace(now, camera_file=camera_file))

@@ -9,10 +9,6 @@ from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
-from lightpen_app.steps.camera.exposure_panel import ExposureControl
-from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsControl
-from lightpen_app.steps.camera.source_panel import BesideControl, SourceSearch
-from lightpen_app.steps.camera.stray_light_panel import MaskControl
 from lightpen_app.steps.camera.view import CameraPanels
 from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.state_banner import StatusMessage
@@ -39,16 +35,7 @@ class CameraPage(Page):
         self._is_shown = False
 
         # Widgets
-        self._view = view = CameraPanels(
-            self._selection, self._camera, self._chosen_files, services
-        )
-        self._search = SourceSearch(self._camera, view.source, view.second.source)
-        self._beside = BesideControl(self._selection, self._chosen_files, view.source)
-        self._files = IntrinsicsControl(workbench, view.intrinsics, services, self)
-        self._mask = MaskControl(
-            self._selection, self._live, view.stray_light, view.images
-        )
-        self._adjusting = ExposureControl(self._live, view.exposure)
+        self._view = view = CameraPanels(workbench, services)
 
         # Layout
         vertical_layout(self, view)
@@ -108,15 +95,15 @@ class CameraPage(Page):
     @override
     def left(self) -> None:
         self._is_shown = False
-        self._adjusting.end_adjustment()
+        self._view.exposure.end_adjustment()
         self._show_camera(0)
         self._view.stray_light.give_up()
 
     @override
     def shut_down(self) -> None:
-        self._view.second.shut_down()
-        self._files.shut_down()
-        self._beside.shut_down()
+        self._view.rig.shut_down()
+        self._view.intrinsics.shut_down()
+        self._view.beside.shut_down()
 
     @override
     def _refresh(self) -> None:
@@ -127,7 +114,7 @@ class CameraPage(Page):
     def _on_workbench_changed(self) -> None:
         now = self._selection.preparation
         self._view.source.set_value(now.source)
-        if self._beside.follow(now.source):
+        if self._view.beside.follow(now.source):
             self._show_connection()  # the missing input may have changed
         self._view.intrinsics.set_value(now.camera_file)
         self._view.intrinsics.set_image_size(now.image_size)
@@ -137,7 +124,7 @@ class CameraPage(Page):
         is_recorded = now.source.kind == SourceKind.RECORDED
         self._view.images.set_recorded(now.origin if is_recorded else None)
         self._view.focus.set_recorded(is_recorded)
-        self._mask.show_mask()
+        self._view.stray_light.show_mask()
         self.changed.emit()
 
     def _on_source_chosen(self, source: SourceChoice) -> None:
@@ -148,7 +135,7 @@ class CameraPage(Page):
             self._chosen_files.use_samples()
 
     def _on_camera_chosen(self, camera: int) -> None:
-        self._adjusting.end_adjustment()
+        self._view.exposure.end_adjustment()
         self._view.stray_light.give_up()
         self._show_camera(camera)
 
@@ -156,7 +143,7 @@ class CameraPage(Page):
         """Show one of the cameras there are, by its number from 0."""
         self._live.choose(camera)
         self._view.images.set_cameras(self._live.n_cameras, self._live.chosen)
-        self._mask.show_mask()
+        self._view.stray_light.show_mask()
 
     def _on_other_changed(self, connection: Connection) -> None:
         self._view.images.set_cameras(self._live.n_cameras, self._live.chosen)
@@ -174,12 +161,12 @@ class CameraPage(Page):
         inspection = inspect(seen.spots, labels)
         self._view.images.set_image(shown, self._live.stats)
         self._view.settings.set_stats(self._live.stats)
-        self._view.second.show_step(seen)
+        self._view.rig.show_step(seen)
         self._view.exposure.set_value(inspection.exposure)
         self._view.focus.add(inspection)
         outcome = self._view.stray_light.outcome().value()
         self._view.stray_light.feed(seen)
-        self._adjusting.adjust(seen, inspection)
+        self._view.exposure.adjust(seen, inspection)
         if self._view.stray_light.outcome().value() != outcome:
             self._live.hurry()  # it searches
             self._view.reveal_stray_light()
@@ -188,9 +175,9 @@ class CameraPage(Page):
         if connection is Connection.LOST:
             self._on_lost()
         if connection is not Connection.STREAMING:
-            self._adjusting.end_adjustment()
+            self._view.exposure.end_adjustment()
             self._view.exposure.set_value(Exposure())
-            self._view.second.forget_step()
+            self._view.rig.set_step(None, None)
             self._view.focus.clear()
         elif self._is_shown:
             self._live.show_pen()
@@ -209,7 +196,7 @@ class CameraPage(Page):
         connection, why = self._live.connection, self._live.why_no_images
         is_live = connection is Connection.STREAMING
         self._view.images.set_connection(connection, why or self._why_closed())
-        for camera, panel in enumerate((self._view.source, self._view.second.source)):
+        for camera, panel in enumerate((self._view.source, self._view.second)):
             panel.set_faulty(self._live.has_failed(camera))
         self._view.stray_light.set_live(is_live)
         caps = self._live.caps if is_live else None

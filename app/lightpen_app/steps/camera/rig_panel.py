@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.formats.rig_files import RigFile, read_rig
@@ -14,7 +13,6 @@ from lightpen.model.rigid import Rig
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.widgets.controls import FileDrops
 from lightpen_app.widgets.fields import PathField, Translated
@@ -28,14 +26,20 @@ FILES = "*.json *.yaml *.yml"
 
 
 class RigPanel(Translated, QGroupBox):
-    """Asks for a second camera, and for the rig file that belongs to it."""
+    """Chooses a second camera, by its own panel, and the rig file of both."""
 
-    wanted = Signal(bool)  # whether two cameras are to look at once
-    path_chosen = Signal(str)  # path of the rig file to open
-
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        selection: Selection,
+        camera: CameraSetup,
+        files: ChosenFiles,
+        source: SourcePanel,
+    ) -> None:
         super().__init__()
         self.say(self, self.tr("Two cameras"))
+        self._selection, self._chosen_files = selection, files
+        self._live, self._source = camera.live, source
+        self._reading = LatestJob(self)
         self._file: RigFile | None = None
         self._late: Message | None = None
         self._n_unpaired: int | None = None
@@ -60,28 +64,55 @@ class RigPanel(Translated, QGroupBox):
         )
 
         # Connections
-        self._second.toggled.connect(self._on_toggled)
-        self._path.path_chosen.connect(self.path_chosen)
+        self._second.clicked.connect(self._on_second_clicked)
+        self._path.path_chosen.connect(self._on_path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
+        source.value_changed.connect(self._choose)
+        source.retry_requested.connect(camera.open)
+        selection.changed.connect(self._on_selected)
+        selection.station_changed.connect(self.shut_down)
 
-        self._refresh()
+        self._on_selected()
 
-    def set_value(self, is_wanted: bool, file: RigFile | None) -> None:
+    def show_step(self, seen: LiveImage) -> None:
+        """Show by the newest image whether two cameras are synchronised."""
+        live = self._live
+        if live.n_cameras == 1:
+            return
+        lag_ms, px_per_mm = live.lag_ms, None
+        camera = self._selection.preparation.camera
+        if (
+            camera is not None
+            and seen.detection is not None
+            and seen.detection.has_pose
+        ):
+            px_per_mm = camera.fx / float(seen.detection.translation[2])
+        n_unpaired = None if lag_ms is None else live.stats.unpaired
+        self.set_step(not_synchronised(lag_ms, px_per_mm), n_unpaired)
+
+    def shut_down(self) -> None:
+        """Cancel reading."""
+        self._reading.cancel()
+
+    def _on_selected(self) -> None:
         """Show whether there are two cameras, and their file.
 
         A complaint about a file that is not used goes away with another file in use,
         and with the second camera.
         """
-        self._second.blockSignals(True)
+        now = self._selection.preparation
+        is_wanted, file = now.second is not None, now.rig_file
         self._second.setChecked(is_wanted)
-        self._second.blockSignals(False)
+        self._source.setVisible(is_wanted)
+        if now.second is not None:
+            self._source.set_value(now.second.source)
         if file is not self._file or not is_wanted:
             self._file = file
             self._path.set_value("" if file is None else str(file.path))
-            self.set_problem("")
+            self._set_problem("")
         self._refresh()
 
-    def set_problem(self, why: str) -> None:
+    def _set_problem(self, why: str) -> None:
         """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(why))
         self._problem.set_value(StatusMessage.fault(why))
@@ -96,8 +127,25 @@ class RigPanel(Translated, QGroupBox):
             self._late, self._n_unpaired = late, n_unpaired
             self._refresh_step()
 
-    def _on_toggled(self, is_wanted: bool) -> None:
-        self.wanted.emit(is_wanted)
+    def _on_second_clicked(self, is_wanted: bool) -> None:
+        now = self._selection.preparation
+        self._choose(SourceChoice(now.source.kind) if is_wanted else None)
+
+    def _choose(self, source: SourceChoice | None) -> None:
+        chosen = self._selection.preparation.with_second(source)
+        self._selection.set_preparation(chosen)
+        is_simulated = source is not None and source.kind == SourceKind.SIMULATED
+        if is_simulated and chosen.rig_file is None:
+            self._chosen_files.use_samples()
+
+    def _on_path_chosen(self, path: str) -> None:
+        self._reading.start(
+            lambda _: read_rig(Path(path)), self._on_rig_read, self._set_problem
+        )
+
+    def _on_rig_read(self, rig_file: RigFile) -> None:
+        now = self._selection.preparation
+        self._selection.set_preparation(now.with_rig(rig_file))
 
     def _on_open_clicked(self) -> None:
         self._path.pick(
@@ -155,83 +203,3 @@ def _baseline(rig: Rig) -> str:
     along = shift / length
     sigma = float(np.sqrt(along @ rig.covariance[3:6, 3:6] @ along))
     return f"{length:.2f} \u00b1 {2 * sigma:.2f} mm (k = 2)"
-
-
-class SecondCameraChoice(QWidget):
-    """Shows and changes the second camera of the preparation."""
-
-    def __init__(
-        self, selection: Selection, camera: CameraSetup, files: ChosenFiles
-    ) -> None:
-        super().__init__()
-        self._selection, self._chosen_files = selection, files
-        self._live = camera.live
-        self._reading = LatestJob(self)
-
-        # Widgets
-        self._rig = RigPanel()
-        self.source = SourcePanel(camera.sources, is_second=True)
-
-        # Layout
-        vertical_layout(self, self._rig, self.source, spacing=2 * GRID)
-
-        # Connections
-        self._rig.wanted.connect(self._on_wanted)
-        self._rig.path_chosen.connect(self._on_path_chosen)
-        self.source.value_changed.connect(self._on_source_chosen)
-        self.source.retry_requested.connect(camera.open)
-        selection.changed.connect(self._on_workbench_changed)
-        selection.station_changed.connect(self.shut_down)
-
-        self._on_workbench_changed()
-
-    def show_step(self, seen: LiveImage) -> None:
-        """Show by the newest image whether two cameras are synchronised."""
-        live = self._live
-        if live.n_cameras == 1:
-            return
-        lag_ms, px_per_mm = live.lag_ms, None
-        camera = self._selection.preparation.camera
-        if (
-            camera is not None
-            and seen.detection is not None
-            and seen.detection.has_pose
-        ):
-            px_per_mm = camera.fx / float(seen.detection.translation[2])
-        n_unpaired = None if lag_ms is None else live.stats.unpaired
-        self._rig.set_step(not_synchronised(lag_ms, px_per_mm), n_unpaired)
-
-    def forget_step(self) -> None:
-        """Clear the lag: no images arrive."""
-        self._rig.set_step(None, None)
-
-    def shut_down(self) -> None:
-        """Cancel reading."""
-        self._reading.cancel()
-
-    def _on_workbench_changed(self) -> None:
-        now = self._selection.preparation
-        self._rig.set_value(now.second is not None, now.rig_file)
-        self.source.setVisible(now.second is not None)
-        if now.second is not None:
-            self.source.set_value(now.second.source)
-
-    def _on_wanted(self, is_wanted: bool) -> None:
-        now = self._selection.preparation
-        self._on_source_chosen(SourceChoice(now.source.kind) if is_wanted else None)
-
-    def _on_source_chosen(self, source: SourceChoice | None) -> None:
-        chosen = self._selection.preparation.with_second(source)
-        self._selection.set_preparation(chosen)
-        is_simulated = source is not None and source.kind == SourceKind.SIMULATED
-        if is_simulated and chosen.rig_file is None:
-            self._chosen_files.use_samples()
-
-    def _on_path_chosen(self, path: str) -> None:
-        self._reading.start(
-            lambda _: read_rig(Path(path)), self._on_rig_read, self._rig.set_problem
-        )
-
-    def _on_rig_read(self, rig_file: RigFile) -> None:
-        now = self._selection.preparation
-        self._selection.set_preparation(now.with_rig(rig_file))

@@ -1,7 +1,6 @@
 """Stray light: search for bright spots with the pen covered, and masking."""
 
 import numpy as np
-from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QGroupBox
 
 from lightpen.arrays import FloatArray
@@ -20,19 +19,14 @@ from lightpen_app.work.selection import Selection
 
 
 class StrayLightPanel(Translated, QGroupBox):
-    """Searches the live images, and asks for a mask."""
+    """Searches the live images, and masks what is found."""
 
-    found_changed = Signal()
-    # array: circles (M, 3) to leave out besides those that are: x, y and radius, px
-    mask_requested = Signal(object)
-    clear_requested = Signal()  # leave nothing out any more
-
-    def __init__(self) -> None:
+    def __init__(self, selection: Selection, live: LiveView, images: LivePanel) -> None:
         super().__init__()
         self.say(self, self.tr("Stray light"))
+        self._selection, self._live, self._images = selection, live, images
         self._search: StraySearch | None = None
         self._knows_pen = False
-        self._n_masked = 0
         self._is_live = False
         self._found: FloatArray = StraySearch().circles()
 
@@ -43,7 +37,7 @@ class StrayLightPanel(Translated, QGroupBox):
         )
         self._start = self.make_button(self.tr("Search"), self._on_start_clicked)
         self._mask = PushButton()
-        self._clear = self.make_button(self.tr("Clear mask"), self.clear_requested)
+        self._clear = self.make_button(self.tr("Clear mask"), self._on_clear_clicked)
         self._outcome = SignLabel()
 
         # Layout
@@ -61,19 +55,25 @@ class StrayLightPanel(Translated, QGroupBox):
 
         self._refresh()
 
-    def found(self) -> FloatArray:
-        """Return the circles (M, 3) that were found and are not masked yet, px."""
-        return self._found
-
     def outcome(self) -> SignLabel:
         """Return the label with the result of the search."""
         return self._outcome
 
-    def set_n_masked(self, n_masked: int) -> None:
-        """Show the number of masked circles."""
-        if n_masked != self._n_masked:
-            self._n_masked = n_masked
-            self._refresh()
+    def show_mask(self) -> None:
+        """Show masked circles and the stray light found."""
+        masked = mask_markers(self._masked)
+        found = stray_markers(self._found, self.tr("stray"))
+        self._images.set_extra_markers((*masked, *found))
+        self._refresh()
+
+    @property
+    def _masked(self) -> FloatArray:
+        """Stray light in the images that are shown, (M, 3), px."""
+        return self._selection.preparation.mask_of(self._live.chosen)
+
+    def _set_mask(self, mask: FloatArray) -> None:
+        now = self._selection.preparation
+        self._selection.set_preparation(now.with_mask(self._live.chosen, mask))
 
     def set_live(self, is_live: bool) -> None:
         """Show whether images arrive; without them a search is cancelled."""
@@ -106,7 +106,7 @@ class StrayLightPanel(Translated, QGroupBox):
     def _set_found(self, circles: FloatArray) -> None:
         if not np.array_equal(circles, self._found):
             self._found = circles
-            self.found_changed.emit()
+            self.show_mask()
 
     def _on_start_clicked(self) -> None:
         self.give_up()
@@ -116,7 +116,10 @@ class StrayLightPanel(Translated, QGroupBox):
     def _on_mask_clicked(self) -> None:
         circles = self._found
         self.give_up()
-        self.mask_requested.emit(circles)
+        self._set_mask(np.concatenate([self._masked, circles]))
+
+    def _on_clear_clicked(self) -> None:
+        self._set_mask(np.zeros((0, 3)))
 
     def _refresh(self) -> None:
         n_found = len(self._found)
@@ -133,15 +136,16 @@ class StrayLightPanel(Translated, QGroupBox):
             why_not_start = self.tr("Search in progress")
         self._start.set_why_not(why_not_start)
         self._mask.set_why_not("" if n_found else self.tr("No spots to mask"))
-        self._clear.set_why_not("" if self._n_masked else self.tr("No mask is set."))
-        self._outcome.set_value(self._outcome_message())
+        n_masked = len(self._masked)
+        self._clear.set_why_not("" if n_masked else self.tr("No mask is set."))
+        self._outcome.set_value(self._outcome_message(n_masked))
 
-    def _outcome_message(self) -> StatusMessage:
+    def _outcome_message(self, n_masked: int) -> StatusMessage:
         search, n_found = self._search, len(self._found)
         if search is None:
-            if not self._n_masked:
+            if not n_masked:
                 return StatusMessage()
-            words = self.tr("Masked areas: {0}").format(self._n_masked)
+            words = self.tr("Masked areas: {0}").format(n_masked)
             return StatusMessage.good(words)
         if not search.is_over:
             words = self.tr("Searching: image {0} of {1}")
@@ -171,45 +175,3 @@ class StrayLightPanel(Translated, QGroupBox):
                 "cannot be distinguished from stray light."
             )
         return StatusMessage.warning(words.format(n_found))
-
-
-class MaskControl(QObject):
-    """Carries out requests of the stray-light panel."""
-
-    def __init__(
-        self,
-        selection: Selection,
-        live: LiveView,
-        panel: StrayLightPanel,
-        images: LivePanel,
-    ) -> None:
-        super().__init__(panel)
-        self._selection, self._live = selection, live
-        self._panel, self._images = panel, images
-
-        # Connections
-        panel.found_changed.connect(self.show_mask)
-        panel.mask_requested.connect(self._on_mask_requested)
-        panel.clear_requested.connect(self._on_clear_requested)
-
-    def show_mask(self) -> None:
-        """Show masked circles and the stray light found."""
-        self._panel.set_n_masked(len(self._mask))
-        masked = mask_markers(self._mask)
-        found = stray_markers(self._panel.found(), self.tr("stray"))
-        self._images.set_extra_markers((*masked, *found))
-
-    @property
-    def _mask(self) -> FloatArray:
-        """Stray light in the images that are shown, (M, 3), px."""
-        return self._selection.preparation.mask_of(self._live.chosen)
-
-    def _set_mask(self, mask: FloatArray) -> None:
-        now = self._selection.preparation
-        self._selection.set_preparation(now.with_mask(self._live.chosen, mask))
-
-    def _on_mask_requested(self, circles: FloatArray) -> None:
-        self._set_mask(np.concatenate([self._mask, circles]))
-
-    def _on_clear_requested(self) -> None:
-        self._set_mask(np.zeros((0, 3)))

@@ -4,21 +4,23 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen_app.face import Services, can_calibrate, can_discover
+from lightpen_app.face import Services
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
-from lightpen_app.steps.camera.rig_panel import SecondCameraChoice
+from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.settings_panel import SettingsPanel
-from lightpen_app.steps.camera.source_panel import SourcePanel
+from lightpen_app.steps.camera.source_panel import (
+    BesideControl,
+    SourcePanel,
+    SourceSearch,
+)
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.widgets.fitting import PageScroll, ResponsiveLayout
 from lightpen_app.widgets.state_banner import SignLabel
-from lightpen_app.work.camera_setup import CameraSetup
-from lightpen_app.work.chosen_files import ChosenFiles
-from lightpen_app.work.selection import Selection
+from lightpen_app.work.workbench import Workbench
 
 SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
 
@@ -28,27 +30,24 @@ class CameraPanels(ResponsiveLayout, QWidget):
 
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
-    def __init__(
-        self,
-        selection: Selection,
-        camera: CameraSetup,
-        files: ChosenFiles,
-        services: Services = (),
-    ) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
 
         # Widgets
+        chosen, files = workbench.selection, workbench.files
+        camera, live = workbench.camera, workbench.live
         self.swing_message = SignLabel()
         self.source = SourcePanel(camera.sources)
-        self.second = SecondCameraChoice(selection, camera, files)
+        self.second = SourcePanel(camera.sources, is_second=True)
+        self.rig = RigPanel(chosen, camera, files, self.second)
         self.settings = SettingsPanel()
-        self.intrinsics = IntrinsicsPanel(
-            can_calibrate(services), can_discover(services)
-        )
-        self.stray_light = StrayLightPanel()
+        self.intrinsics = IntrinsicsPanel(chosen, services)
         self.images = LivePanel()
-        self.exposure = ExposurePanel()
+        self.stray_light = StrayLightPanel(chosen, live, self.images)
+        self.exposure = ExposurePanel(live)
         self.focus = FocusPanel()
+        self._search = SourceSearch(camera, self.source, self.second)
+        self.beside = BesideControl(chosen, files, self.source)
 
         # Layout
         side = QWidget()
@@ -58,6 +57,7 @@ class CameraPanels(ResponsiveLayout, QWidget):
             self.source,
             self.settings,
             self.intrinsics,
+            self.rig,
             self.second,
             self.stray_light,
             1,
@@ -66,7 +66,7 @@ class CameraPanels(ResponsiveLayout, QWidget):
         self._side = scroll = PageScroll()
         scroll.setWidget(side)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._layout = layout = grid_layout(self, spacing=-1)
+        self._grid = layout = grid_layout(self, spacing=-1)
         layout.addWidget(self.images, 0, 0)
         self._foot = horizontal_layout(layout, at=(1, 0), spacing=2 * GRID)
         self._use_room()  # before the side: the order of the Tab key
@@ -89,7 +89,7 @@ class CameraPanels(ResponsiveLayout, QWidget):
         else:
             self._foot.addWidget(self.exposure, 3)
             self._foot.addWidget(self.focus, 2)
-        self._layout.setHorizontalSpacing(2 * GRID if is_narrow else 3 * GRID)
+        self._grid.setHorizontalSpacing(2 * GRID if is_narrow else 3 * GRID)
         # The layout spaces out an empty foot, too.
-        self._layout.setVerticalSpacing(0 if is_narrow else 2 * GRID)
+        self._grid.setVerticalSpacing(0 if is_narrow else 2 * GRID)
         self._side.setFixedWidth(NARROW_SIDE_WIDTH if is_narrow else SIDE_WIDTH)

@@ -1,6 +1,6 @@
 """Panels on the whole archive: check and save, and tips that are due."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -11,23 +11,24 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
-from lightpen.archive.history import DueTip, EntryFilter, save_entries
+from lightpen.archive.history import DueTip, EntryFilter, due_tips, save_entries
 from lightpen.archive.logbook import ReplicationState
+from lightpen.model.limits import DueRule
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import LEAST_SHOWN, PARTED, day_text, shortened
+from lightpen_app.steps.history.entry_panel import NOTICE
 from lightpen_app.widgets.bars import JobProgress
 from lightpen_app.widgets.controls import ask_file
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import Figures, NumberTable
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
-NOTICE = "history"  # cause of its notifications
 MOST_SHOWN = 100  # findings; the rest is counted
 
 
@@ -195,9 +196,13 @@ class ArchivePanel(Translated, QWidget):
 class DuePanel(Translated, QWidget):
     """Shows the current tips with their due dates."""
 
-    def __init__(self, now: Callable[[], datetime]) -> None:
+    def __init__(self, workbench: Workbench) -> None:
         super().__init__()
-        self._now = now
+        self._run, self._library = workbench.run, workbench.library
+        self._selection, self._now = workbench.selection, workbench.around.now
+        self._notices = workbench.notifications
+        self._rule: DueRule | None = None  # by which they were read last
+        self._reading = LatestJob(self)
         self._tips: tuple[DueTip, ...] = ()
 
         # Widgets
@@ -207,12 +212,33 @@ class DuePanel(Translated, QWidget):
         # Layout
         vertical_layout(self, self._head, self._table, 1, margins=(0, GRID, 0, 0))
 
+        # Connections
+        self._selection.changed.connect(self._on_selected)
+
         self._refresh()
 
-    def set_tips(self, tips: Sequence[DueTip]) -> None:
-        """Show other tips."""
-        self._tips = tuple(tips)
+    def read(self) -> None:
+        """Read when the current tips at this station are due."""
+        logbook, library = self._run.logbook, self._library.library
+        self._rule = rule = self._selection.limits.due
+
+        def read(_: Report) -> tuple[DueTip, ...]:
+            opened = logbook.opened()
+            return due_tips(opened.database, opened.chain, rule, library)
+
+        self._reading.start(read, self._on_read, partial(self._notices.notify, NOTICE))
+
+    def shut_down(self) -> None:
+        """Cancel reading."""
+        self._reading.cancel()
+
+    def _on_read(self, tips: tuple[DueTip, ...]) -> None:
+        self._tips = tips
         self._refresh()
+
+    def _on_selected(self) -> None:
+        if self._rule not in (None, self._selection.limits.due):
+            self.read()
 
     def _refresh(self) -> None:
         now = self._now()

@@ -7,7 +7,7 @@ from PySide6.QtCore import QCoreApplication, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.chains import BESIDE_SWINGS, Event, Kind, StoredEntry
-from lightpen.archive.history import Line, TipState
+from lightpen.archive.history import Line, TipState, messages_on
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import Plain
 from lightpen.model.limits import LIMITS
@@ -20,6 +20,7 @@ from lightpen.record.library.signing import (
     SUPERVISOR_SIGNATURE,
 )
 from lightpen.record.library.supervision import Signature
+from lightpen_app.face import ReportPrinter
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import GRADE_MARKS, grade_text, origin_text
@@ -30,7 +31,10 @@ from lightpen_app.widgets.bars import ReasonBar
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.work.job import Job, LatestJob
+from lightpen_app.work.workbench import Workbench
 
+NOTICE = "history"  # cause of its notifications
 EventText: TypeAlias = Callable[[Event], str]
 
 CONTEXT = "history"
@@ -175,12 +179,16 @@ SHORT = 12  # characters of a hash
 class EntryPanel(Translated, QWidget):
     """Shows an entry with its comments; adds a comment."""
 
-    note_given = Signal(object, str)  # Written, str: a note on an entry
-    report_requested = Signal(object)  # Written: entry whose printed report to show
+    note_entered = Signal()
 
-    def __init__(self, kind_of: EventText) -> None:
+    def __init__(
+        self, workbench: Workbench, printer: ReportPrinter, kind_of: EventText
+    ) -> None:
         super().__init__()
-        self._kind_of = kind_of
+        self._run, self._selection = workbench.run, workbench.selection
+        self._notices, self._folder = workbench.notifications, workbench.folder
+        self._printer, self._kind_of = printer, kind_of
+        self._reading = LatestJob(self)
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
         self._messages: tuple[StoredEntry, ...] = ()
@@ -195,6 +203,7 @@ class EntryPanel(Translated, QWidget):
         self._texts = (self._what, self._who, self._why, self._notes, self._kept)
         self._note = self.make_button(self.tr("Add comment..."), self._ask)
         self._report = PushButton()
+        self._report.setVisible(printer.is_here)
         self._reason = ReasonBar()
 
         # Layout
@@ -210,7 +219,7 @@ class EntryPanel(Translated, QWidget):
         fill(layout, self._reason, 1)
 
         # Connections
-        self._report.clicked.connect(self._request_report)
+        self._report.clicked.connect(self._show_report)
         self._reason.given.connect(self._on_given)
 
         self._refresh()
@@ -225,12 +234,26 @@ class EntryPanel(Translated, QWidget):
             return
         self._line, self._messages = line, ()
         self._reason.hide()
+        self._reading.cancel()
+        self._refresh()
+        if line is not None and line.entry is not None:
+            logbook, entry = self._run.logbook, line.entry
+            self._reading.start(
+                lambda _: messages_on(logbook.opened().database, entry),
+                self._on_messages_read,
+                self._show_fault,
+            )
+
+    def shut_down(self) -> None:
+        """Cancel reading."""
+        self._reading.cancel()
+
+    def _on_messages_read(self, messages: Sequence[StoredEntry]) -> None:
+        self._messages = tuple(messages)
         self._refresh()
 
-    def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
-        """Show the messages on the entry."""
-        self._messages = tuple(remarks)
-        self._refresh()
+    def _show_fault(self, sentence: str) -> None:
+        self._notices.notify(NOTICE, sentence)
 
     def words(self) -> tuple[str, ...]:
         """Return the texts on the entry."""
@@ -252,16 +275,24 @@ class EntryPanel(Translated, QWidget):
             self.tr("Cancel"),
         )
 
-    def set_has_report(self, has_report: bool) -> None:
-        """Show the button of the report if something can show it."""
-        self._report.setVisible(has_report)
-
-    def _request_report(self) -> None:
-        if self._line is not None and self._line.entry is not None:
-            self.report_requested.emit(self._line.entry)
+    def _show_report(self) -> None:
+        if self._line is None or self._line.entry is None:
+            return
+        event, folder = self._line.entry.entry.event, self._folder
+        if (result := event.result) is None:
+            return
+        if event.kind is Kind.VERIFICATION:
+            self._printer.show_verification(folder / result.place)
+        else:
+            self._printer.show(lambda: folder / result.place)
 
     def _on_given(self, text: str, signature: Signature | None) -> None:
-        self.note_given.emit(self._asked, text)
+        """Enter a comment, also during operations on the whole archive."""
+        logbook, about = self._run.logbook, self._asked
+        operator = self._selection.preparation.names.operator
+        assert about is not None
+        job = Job(lambda _: logbook.opened().enter_note(about, text, operator), self)
+        job.start(lambda _: self.note_entered.emit(), self._show_fault)
 
     def _refresh(self) -> None:
         line, entry = self._line, None if self._line is None else self._line.entry

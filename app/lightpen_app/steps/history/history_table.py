@@ -1,6 +1,7 @@
 """The entries of the archive as a table, the newest first, read on demand."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from itertools import chain, islice
 from typing import Any
@@ -11,7 +12,15 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QWidget
 from typing_extensions import override
 
 from lightpen.archive.chains import Kind
-from lightpen.archive.history import EntryFilter, KnownNames, Line
+from lightpen.archive.history import (
+    EntryFilter,
+    KnownNames,
+    Line,
+    known_names,
+    lines,
+    n_wanted,
+)
+from lightpen.archive.logbook import Logbook, ReplicationState
 from lightpen.local_time import local_time
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, set_size
@@ -33,6 +42,29 @@ LONGEST_NAME = 16  # letters of a name that are shown
 WIDEST = 26 * GRID  # px, of a column
 LEAST_ROWS = 3
 MOST_SELECTED = 1000  # lines that are compared
+BLOCK = 200  # lines that are read at one time
+
+
+@dataclass(frozen=True)
+class FirstEntries:
+    """The first data read for a filter."""
+
+    n_lines: int
+    first: tuple[Line, ...]  # the newest
+    names: KnownNames
+    # Replication to the server; None without a server.
+    delivery: ReplicationState | None
+
+
+def first_entries(wanted: EntryFilter, logbook: Logbook) -> FirstEntries:
+    """Return the number of the entries wanted and the newest of them."""
+    database = logbook.database
+    return FirstEntries(
+        n_wanted(database, wanted),
+        lines(database, wanted, 0, BLOCK),
+        known_names(database),
+        logbook.delivery(),
+    )
 
 
 class HistoryModel(TitledModel):

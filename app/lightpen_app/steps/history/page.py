@@ -1,7 +1,7 @@
 """The step History: the complete history of pens and tips."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -9,48 +9,32 @@ from typing import TypeVar
 from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
-from lightpen.archive.chains import Kind, StoredEntry
-from lightpen.archive.history import (
-    EntryFilter,
-    KnownNames,
-    Line,
-    due_tips,
-    known_names,
-    lines,
-    messages_on,
-    n_wanted,
-)
-from lightpen.archive.logbook import Logbook, ReplicationState
+from lightpen.archive.chains import StoredEntry
+from lightpen.archive.history import EntryFilter, Line, lines
+from lightpen.archive.logbook import Logbook
 from lightpen.archive.trends import Trend, trend_of
-from lightpen.model.limits import DueRule
 from lightpen_app.face import Services, event_text, report_printer
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.history.archive_panel import NOTICE, ArchivePanel, DuePanel
-from lightpen_app.steps.history.entry_panel import EntryPanel
-from lightpen_app.steps.history.history_table import FilterBar, HistoryTable
+from lightpen_app.steps.history.archive_panel import ArchivePanel, DuePanel
+from lightpen_app.steps.history.entry_panel import NOTICE, EntryPanel
+from lightpen_app.steps.history.history_table import (
+    BLOCK,
+    FilterBar,
+    FirstEntries,
+    HistoryTable,
+    first_entries,
+)
 from lightpen_app.widgets.fields import Text
 from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.trend_panel import TrendPanel
-from lightpen_app.work.job import Job, LatestJob
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 TABLE_SHARE, TABS_SHARE = 3, 4  # of the height
 LEAST_TABS = 16 * GRID  # px
-BLOCK = 200  # lines that are read at one time
-
-
-@dataclass(frozen=True)
-class FirstEntries:
-    """The first data read for a filter."""
-
-    n_lines: int
-    first: tuple[Line, ...]  # the newest
-    names: KnownNames
-    # Replication to the server; None without a server.
-    delivery: ReplicationState | None
 
 
 class HistoryPage(Page):
@@ -62,28 +46,24 @@ class HistoryPage(Page):
         super().__init__()
         kind_of = partial(event_text, services)
         self._run = workbench.run
-        self._chosen, self._tips = workbench.selection, workbench.library
         self._settings = workbench.settings
         self._notices = workbench.notifications
-        self._folder = workbench.folder
         self._print_report = report_printer(services, workbench.save_place, self)
         self._trend = Trend()
-        self._rule = DueRule()
         self._wanted = EntryFilter()
         self._followed: EntryFilter | None = None  # whose trend it is
-        self._entries, self._due_tips = LatestJob(self), LatestJob(self)
-        self._more, self._trends = LatestJob(self), LatestJob(self)
-        self._messages = LatestJob(self)
+        self._entries, self._more = LatestJob(self), LatestJob(self)
+        self._trends = LatestJob(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self._filter = FilterBar()
         self._table = HistoryTable(kind_of)
         self._tabs = QTabWidget()
-        self._entry = EntryPanel(kind_of)
+        self._entry = EntryPanel(workbench, self._print_report, kind_of)
         self._trend_panel = TrendPanel()
         made = (each.selection_tab() for each in services)
         self._of_services = tuple(filter(None, made))
-        self._due = DuePanel(workbench.around.now)
+        self._due = DuePanel(workbench)
         self._archive = ArchivePanel(workbench, self._filter.value)
         tabs = (
             (self._trend_panel, self.tr("Trend")),
@@ -112,15 +92,12 @@ class HistoryPage(Page):
         self._table.more_wanted.connect(self._read_more)
         self._table.columns_changed.connect(self._on_columns_changed)
         self._table.selection_changed.connect(self._on_selection_changed)
-        self._entry.note_given.connect(self._enter_note)
-        self._entry.report_requested.connect(self._show_report)
-        self._entry.set_has_report(self._print_report.is_here)
+        self._entry.note_entered.connect(self._read_anew)
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
         for each in self._of_services:
             each.verification_kept.connect(self._on_verification_kept)
         self._archive.checked.connect(self.changed)
-        workbench.selection.changed.connect(self._on_workbench_changed)
 
         self._table.set_hidden_columns(self._settings.last().hidden_columns)
 
@@ -158,9 +135,10 @@ class HistoryPage(Page):
     def shut_down(self) -> None:
         self._print_report.shut_down()
         self._archive.shut_down()
-        for job in (self._entries, self._due_tips):
+        for each in (self._entry, self._due):
+            each.shut_down()
+        for job in (self._entries, self._more, self._trends):
             job.cancel()
-        self._drop_details()
 
     @override
     def _refresh(self) -> None:
@@ -174,25 +152,13 @@ class HistoryPage(Page):
         logbook = self._run.logbook
         job.start(lambda _: query(logbook.opened()), show, self._show_fault)
 
-    def _drop_details(self) -> None:
-        for job in (self._more, self._trends, self._messages):
-            job.cancel()
-
     def _read_anew(self) -> None:
         """Read the number of entries of the filter, and the newest ones."""
         self._wanted = wanted = self._filter.value()
-        self._drop_details()
+        for job in (self._more, self._trends):
+            job.cancel()
 
-        def read(logbook: Logbook) -> FirstEntries:
-            database = logbook.database
-            return FirstEntries(
-                n_wanted(database, wanted),
-                lines(database, wanted, 0, BLOCK),
-                known_names(database),
-                logbook.delivery(),
-            )
-
-        self._read(self._entries, read, self._on_read)
+        self._read(self._entries, partial(first_entries, wanted), self._on_read)
 
     def _read_more(self, first: int) -> None:
         """Read the lines after as many others."""
@@ -202,19 +168,6 @@ class HistoryPage(Page):
             lambda logbook: lines(logbook.database, wanted, first, BLOCK),
             partial(self._table.add_lines, first),
         )
-
-    def _read_due(self) -> None:
-        self._rule = rule = self._chosen.limits.due
-        library = self._tips.library
-        self._read(
-            self._due_tips,
-            lambda logbook: due_tips(logbook.database, logbook.chain, rule, library),
-            self._due.set_tips,
-        )
-
-    def _on_workbench_changed(self) -> None:
-        if self.isVisible() and self._chosen.limits.due != self._rule:
-            self._read_due()
 
     # What is shown
 
@@ -234,7 +187,7 @@ class HistoryPage(Page):
         words = self.tr("1 entry") if n_lines == 1 else self.tr("{0} entries")
         self._notices.show_status(words.format(n_lines))
         # Deferred until the visible parts are shown.
-        self._read_due()
+        self._due.read()
 
     def _on_columns_changed(self) -> None:
         self._settings.set_last(hidden_columns=self._table.hidden_columns())
@@ -245,11 +198,6 @@ class HistoryPage(Page):
         if line != self._entry.value():
             self._entry.set_value(line)
             if entry is not None:
-                self._read(
-                    self._messages,
-                    lambda logbook: messages_on(logbook.database, entry),
-                    self._entry.set_messages,
-                )
                 self._follow(entry)
         self._trend_panel.mark(_hash_of(line))
         self._show_selection()
@@ -282,25 +230,6 @@ class HistoryPage(Page):
         selected = [entry for entry in entries if entry is not None]
         for each in self._of_services:
             each.set_value(selected, self._trend)
-
-    # What is entered
-
-    def _enter_note(self, about: StoredEntry, text: str) -> None:
-        """Enter a comment, also during operations on the whole archive."""
-        logbook, operator = self._run.logbook, self._chosen.preparation.names.operator
-        job = Job(lambda _: logbook.opened().enter_note(about, text, operator), self)
-        job.start(self._read_anew, self._show_fault)
-
-    # What is printed
-
-    def _show_report(self, entry: StoredEntry) -> None:
-        result, folder = entry.entry.event.result, self._folder
-        if result is None:
-            return
-        if entry.entry.event.kind is Kind.VERIFICATION:
-            self._print_report.show_verification(folder / result.place)
-        else:
-            self._print_report.show(lambda: folder / result.place)
 
     def _on_verification_kept(self, file: Path) -> None:
         self._read_anew()

@@ -10,8 +10,7 @@ from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.model.names import Method
-from lightpen.record.library.supervision import Signature
-from lightpen.record.results.acceptance import SwingAssessment, takes_supervisor
+from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services, press_comparison, verify_step
@@ -25,7 +24,6 @@ from lightpen_app.steps.review.view_state import (
     differs,
     next_step,
     next_step_text,
-    repeat_question,
     returns_to_swing,
     review_action,
     review_page_state,
@@ -52,7 +50,7 @@ class ReviewPage(Page):
         self._shown = SwingStatus()
 
         # Widgets
-        self._view = view = ReviewView(self._run, workbench.save_place, services)
+        self._view = view = ReviewView(workbench, services)
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
@@ -73,12 +71,6 @@ class ReviewPage(Page):
         view.solving.cancelled.connect(cancel)
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
-        view.accept.clicked.connect(self._ask_reason)
-        view.reason.given.connect(self._accept)
-        view.repeat.clicked.connect(self._ask_to_repeat)
-        view.take_back.clicked.connect(self._ask_to_revoke)
-        view.withdrawal.given.connect(self._revoke)
-        self._run.refused.connect(self._on_refused)
         view.tabs.images.made.connect(self._on_images_made)
         view.tabs.methods.made.connect(self._on_methods_made)
         view.tools.set_can_press(self._press.is_here)
@@ -146,7 +138,7 @@ class ReviewPage(Page):
                     "leds" if verdict is None else step_of_file(verdict.reason)
                 )
             case _:
-                self._ask_to_repeat()
+                self._view.ask_to_repeat()
 
     @override
     def first_control(self) -> QWidget:
@@ -243,38 +235,6 @@ class ReviewPage(Page):
 
     def _include(self, numbers: list[int]) -> None:
         self._ask(lambda workflow: workflow.solving.include(numbers))
-
-    def _ask_to_repeat(self) -> None:
-        discard = partial(self._ask, SwingWorkflow.discard)
-        self._view.question.ask_about(repeat_question, discard)
-
-    def _ask_reason(self) -> None:
-        status = self._run.status
-        if status.assessment is not None:
-            supervision, station = self._selection.supervision, status.names.station
-            of_supervisor = takes_supervisor(supervision, status.assessment, station)
-            self._view.reason.ask(of_supervisor=of_supervisor)
-
-    def _accept(self, reason: str, signature: Signature | None) -> None:
-        self._ask(lambda workflow: workflow.solving.accept(reason, signature))
-
-    def _ask_to_revoke(self) -> None:
-        is_guarded = self._selection.supervision.is_guarded
-        self._view.withdrawal.ask(of_supervisor=is_guarded)
-
-    def _revoke(self, reason: str, signature: Signature | None) -> None:
-        result = self._run.status.result
-        if result is not None:
-            operator = self._selection.preparation.names.operator
-            self._ask(
-                lambda workflow: workflow.solving.revoke(
-                    result, operator, reason, signature
-                )
-            )
-
-    def _on_refused(self) -> None:
-        if self._run.status.result is None:
-            self._view.reason.refuse()
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

@@ -5,6 +5,9 @@ from functools import partial
 from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
+from lightpen.record.library.supervision import Signature
+from lightpen.record.results.acceptance import takes_supervisor
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import (
     fill,
@@ -26,7 +29,7 @@ from lightpen_app.steps.review.result_panel import (
     StatusMessageList,
     TipSummary,
 )
-from lightpen_app.steps.review.view_state import ReviewPageState
+from lightpen_app.steps.review.view_state import ReviewPageState, repeat_question
 from lightpen_app.widgets.bars import (
     JobProgress,
     QuestionBar,
@@ -42,8 +45,8 @@ from lightpen_app.widgets.fitting import (
     ShrinkingScrollContent,
 )
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.swing_run import SwingRun
+from lightpen_app.work.workbench import Workbench
 
 
 class DetailTabs(QTabWidget):
@@ -103,24 +106,25 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     # px; then tip and buttons are in the first tab, too
     narrow_below, low_below = 112 * GRID, 60 * GRID
 
-    def __init__(
-        self, run: SwingRun, place: SavePlace, services: Services = ()
-    ) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
+        run, place = workbench.run, workbench.save_place
+        self._selection, self._run = workbench.selection, run
+        self._ask = run.runner.ask
         self._can_verify = bool(verify_step(services))
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
-        self.question, self.reason = QuestionBar(), ReasonBar()
-        self.withdrawal = WithdrawalBar()
+        self._question, self._reason = QuestionBar(), ReasonBar()
+        self._withdrawal = WithdrawalBar()
         self.solving = JobProgress(PATIENCE_MS)
         self._messages = StatusMessageList()
         self.result = ResultPanel()
         self._scroll = self.say(PageScroll(), self.tr("Result"))
-        self.repeat = self.make_button(self.tr("Repeat swing"))
+        self._repeat = self.make_button(self.tr("Repeat swing"))
         self.capture_more = self.make_button(self.tr("Capture more"))
-        self.accept = self.make_button(self.tr("Accept..."))
+        self._accept = self.make_button(self.tr("Accept..."))
         self.verify = self.make_button(
             self.tr("Verify tip"),
             tip=self.tr(
@@ -128,7 +132,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
                 "sides."
             ),
         )
-        self.take_back = self.make_button(
+        self._take_back = self.make_button(
             self.tr("Revoke acceptance..."),
             tip=self.tr(
                 "Reinstate the previous result. Both results stay in the archive."
@@ -143,11 +147,11 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._first_box = vertical_layout(self._first, (self.result, 1))
         row = horizontal_layout(self._buttons, (self.tools, 3))
         self._button_rows = row
-        others = horizontal_layout(row, (self.repeat, 1), (self.capture_more, 1))
+        others = horizontal_layout(row, (self._repeat, 1), (self.capture_more, 1))
         row.setStretchFactor(others, 2)
-        fill(others, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
-        self._box = layout = vertical_layout(self, self._banner, self.question)
-        fill(layout, self.reason, self.withdrawal, self.solving, self._messages)
+        fill(others, (self._accept, 1), (self.verify, 1), (self._take_back, 1))
+        self._box = layout = vertical_layout(self, self._banner, self._question)
+        fill(layout, self._reason, self._withdrawal, self.solving, self._messages)
         fill(layout, (self.tabs, 1))
         self.tabs.insertTab(0, self._scroll, "")
         names = (
@@ -162,9 +166,15 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._use_room()
 
         # Connections
-        self.reason.declined.connect(self.tabs.setFocus)
-        self.withdrawal.declined.connect(self.tabs.setFocus)
-        self.question.declined.connect(self.tabs.setFocus)
+        self._accept.clicked.connect(self._ask_reason)
+        self._reason.given.connect(self._on_reason_given)
+        self._repeat.clicked.connect(self.ask_to_repeat)
+        self._take_back.clicked.connect(self._ask_to_revoke)
+        self._withdrawal.given.connect(self._revoke)
+        run.refused.connect(self._on_refused)
+        self._reason.declined.connect(self.tabs.setFocus)
+        self._withdrawal.declined.connect(self.tabs.setFocus)
+        self._question.declined.connect(self.tabs.setFocus)
 
         self._refresh()
 
@@ -178,29 +188,64 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.capture_more.set_why_not(
             state.why_not_more, self.tr("Adds images to this swing")
         )
-        self.repeat.set_why_not(
+        self._repeat.set_why_not(
             state.why_not_repeated, self.tr("Starts a new swing without these images")
         )
-        self.accept.setVisible(state.takes_reason)
-        self.accept.set_why_not(state.why_not_accepted, self.tr("Accept with a reason"))
+        self._accept.setVisible(state.takes_reason)
+        self._accept.set_why_not(
+            state.why_not_accepted, self.tr("Accept with a reason")
+        )
         self.tools.set_why_not(state.why_not_saved)
         self.tools.set_report_why_not(state.why_not_printed)
         self.tools.set_press_why_not(state.why_not_pressed)
-        for button in (self.repeat, self.capture_more):
+        for button in (self._repeat, self.capture_more):
             is_main = button.text() == state.main.text
             button.setVisible(not state.is_accepted and not is_main)
         self.verify.setVisible(state.is_accepted and self._can_verify)
-        self.take_back.setVisible(state.is_accepted)
+        self._take_back.setVisible(state.is_accepted)
+
+    def ask_to_repeat(self) -> None:
+        """Ask whether to set the swing aside and repeat it."""
+        discard = partial(self._ask, SwingWorkflow.discard)
+        self._question.ask_about(repeat_question, discard)
+
+    def _ask_reason(self) -> None:
+        status = self._run.status
+        if status.assessment is not None:
+            supervision, station = self._selection.supervision, status.names.station
+            of_supervisor = takes_supervisor(supervision, status.assessment, station)
+            self._reason.ask(of_supervisor=of_supervisor)
+
+    def _on_reason_given(self, reason: str, signature: Signature | None) -> None:
+        self._ask(lambda workflow: workflow.solving.accept(reason, signature))
+
+    def _ask_to_revoke(self) -> None:
+        is_guarded = self._selection.supervision.is_guarded
+        self._withdrawal.ask(of_supervisor=is_guarded)
+
+    def _revoke(self, reason: str, signature: Signature | None) -> None:
+        result = self._run.status.result
+        if result is not None:
+            operator = self._selection.preparation.names.operator
+            self._ask(
+                lambda workflow: workflow.solving.revoke(
+                    result, operator, reason, signature
+                )
+            )
+
+    def _on_refused(self) -> None:
+        if self._run.status.result is None:
+            self._reason.refuse()
 
     def end_questions(self) -> None:
         """Hide the question."""
-        self.question.hide()
-        self.reason.hide()
-        self.withdrawal.hide()
+        self._question.hide()
+        self._reason.hide()
+        self._withdrawal.hide()
 
     @override
     def _refresh(self) -> None:
-        self.reason.set_words(
+        self._reason.set_words(
             self.tr("This result needs checking. Enter the reason for accepting it."),
             self.tr("Reason"),
             self.tr("Accept with reason"),

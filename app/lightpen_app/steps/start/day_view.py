@@ -1,15 +1,19 @@
 """The day page: tips of the station, and readiness for a swing."""
 
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import QModelIndex, Signal
+import numpy as np
+from PySide6.QtCore import QModelIndex, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.limits import COLDEST, WARMEST
-from lightpen_app.face import ReadinessItem
+from lightpen.swing.preparation import Preparation
+from lightpen_app.face import ReadinessItem, Services
 from lightpen_app.look.layouts import (
     fill,
     horizontal_layout,
@@ -24,13 +28,26 @@ from lightpen_app.look.theme import (
     set_tone,
     text_label,
 )
-from lightpen_app.look.words import set_tooltip
-from lightpen_app.steps.start.day_state import TipRow
+from lightpen_app.look.words import PARTED, set_tooltip, shortened
+from lightpen_app.steps.start.day_state import (
+    CameraState,
+    TipRow,
+    readiness,
+    tip_details,
+    tip_rows,
+)
 from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
 from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.widgets.number_field import NumberField, is_refusing
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.widgets.tables import RIGHT, RowTable
+from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.workbench import Workbench
+
+REFRESH_MS = 500
+LONGEST_NAME = 16  # letters of a tip on the main button
+N_MISFITS = 10  # images by which the LEDs are judged
 
 
 class ReadinessLine(QFrame):
@@ -142,19 +159,20 @@ class TemperatureField(NumberField):
 
 
 class DayView(Translated, QWidget):
-    """Daily settings; the station setup is a view of its own."""
+    """Shows tips and readiness, and chooses tips; the setup is a view of its own."""
 
-    tip_chosen = Signal(str, str)  # pen and tip of the row that was chosen
-    tip_entered = Signal(str)  # text of the field
-    rows_changed = Signal()  # the user narrowed the table or widened it
-    # Temperature of the pen, degrees Celsius, or None if not measured.
-    temperature_entered = Signal(object)
-    step_requested = Signal(str)  # where something is put right
-    swing_requested = Signal()  # the plain buttons
+    changed = Signal()  # `main_action` may be different
+    step_requested = Signal(str)  # key of the step to show
+    code_entered = Signal(str)  # of a tip that is not the only one in the table
     setup_requested = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, workbench: Workbench, services: Services) -> None:
         super().__init__()
+        self._selection, self._live = workbench.selection, workbench.live
+        self._tips, self._pens = workbench.library, workbench.pens
+        self._services = tuple(services)
+        self._misfits: deque[float] = deque(maxlen=N_MISFITS)
+        self._refreshing = QTimer(self, interval=REFRESH_MS)
         self._rows: tuple[TipRow, ...] = ()
         self._shown: tuple[TipRow, ...] = ()
         self._chosen = ("", "")
@@ -196,7 +214,9 @@ class DayView(Translated, QWidget):
         across.setStretchLastSection(False)
         across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self._details = text_label(TextSize.BODY, Tone.QUIET)
-        self._swing = self.make_button(self.tr("Swing anyway"), self.swing_requested)
+        self._swing = self.make_button(
+            self.tr("Swing anyway"), lambda: self.step_requested.emit("swing")
+        )
         self._setup = self.make_button(
             self.tr("Set up station..."), self.setup_requested
         )
@@ -218,62 +238,117 @@ class DayView(Translated, QWidget):
         self._ready.step_requested.connect(self._on_step_requested)
         self._temperature.entered.connect(self._on_answered)
         self._search.textChanged.connect(self._on_narrowed)
-        self._search.entered.connect(self.tip_entered)
+        self._search.entered.connect(self._on_tip_entered)
         self._which.activated.connect(self._on_narrowed)
         self._table.selectionModel().currentRowChanged.connect(self._on_row_changed)
+        self._refreshing.timeout.connect(self._show_readiness)
+        self._selection.changed.connect(self._on_selected)
+        self._tips.changed.connect(self._refresh)
+        self._pens.changed.connect(self._show_readiness)
+        self._live.image_shown.connect(self._on_image_shown)
+        self._live.connection_changed.connect(self._show_readiness)
 
+    def start(self) -> None:
+        """Follow the camera while the page is shown."""
+        self._misfits.clear()
         self._refresh()
+        self._refreshing.start()
+
+    def stop(self) -> None:
+        """Stop updating the page."""
+        self._refreshing.stop()
 
     def first_control(self) -> QWidget:
         """Return the field that has the focus at first."""
         return self._search
 
-    def readiness(self) -> tuple[ReadinessItem, ...]:
-        """Return the text on the swing."""
-        return self._ready.items()
-
-    def set_question(self, temperature_c: float | None, *, is_asked: bool) -> None:
-        """Ask for the pen's temperature; the last one is offered, or none."""
-        if is_asked and self._asking.isHidden():
-            last = COLDEST if temperature_c is None else temperature_c
-            self._temperature.set_value(last)
-        self._asking.setVisible(is_asked)
-
     def rows(self) -> tuple[TipRow, ...]:
         """Return the rows that are shown."""
         return self._shown
-
-    def search(self) -> str:
-        """Return the text that the rows match."""
-        return self._search.text().strip()
 
     def set_narrow(self, narrow: bool) -> None:
         """Put the last result below the table where there is little width."""
         set_stacked(self._columns, narrow)
         self._ready.set_narrow(narrow)
 
-    def set_ready(
-        self, place: str, items: Sequence[ReadinessItem], *, can_swing: bool
-    ) -> None:
-        """Show station, operator and readiness; offer a swing if it is incomplete."""
+    def main_action(self) -> MainAction:
+        """Return the action of the main button: swing, or show the missing input."""
+        amber = self._first_amber()
+        if amber is None:
+            tip = shortened(self._selection.preparation.names.tip, LONGEST_NAME)
+            return MainAction(
+                self.tr("Swing tip {0}").format(tip), self._why_not_swing()
+            )
+        return MainAction(amber.action)
+
+    def run_main_action(self) -> None:
+        """Run the action of the main button."""
+        amber = self._first_amber()
+        if amber is not None and amber.step == "temperature":
+            self._lead_to_temperature()
+        else:
+            self.step_requested.emit("swing" if amber is None else amber.step)
+
+    @override
+    def _refresh(self) -> None:
+        now, statuses = self._selection.preparation, self._tips.statuses
+        rows, chosen = tip_rows(now, statuses), self._names()
+        self._details.setText(tip_details(now, statuses))
+        if (rows, chosen) != (self._rows, self._chosen):
+            self._rows, self._chosen = rows, chosen
+            self._fill()
+        self._show_readiness()
+
+    def _show_readiness(self) -> None:
+        """Show whether a swing can start, and ask for the temperature of the pen."""
+        now, items = self._selection.preparation, self._items()
+        is_asked = now.asks_temperature or now.lacks_temperature
+        if is_asked and self._asking.isHidden():  # the last one is offered, or none
+            last = now.assumptions.temperature_c
+            self._temperature.set_value(COLDEST if last is None else last)
+        self._asking.setVisible(is_asked)
+        is_other = items != self._ready.items()
+        place = PARTED.join(map(shortened, (now.names.station, now.names.operator)))
         self._ready.set_place(place)
         self._ready.set_items(items)
         is_amber = any(item.is_amber for item in items)
+        can_swing = not (now.missing_inputs() or self._why_not_swing())
         self._swing.setVisible(is_amber and can_swing)
+        if is_other:
+            self.changed.emit()
 
-    def set_tips(
-        self, rows: Sequence[TipRow], chosen: tuple[str, str], details: str
-    ) -> None:
-        """Show other tips; ``chosen`` is the selected pen and tip."""
-        self._details.setText(details)
-        if tuple(rows) == self._rows and chosen == self._chosen:
-            return
-        self._rows, self._chosen = tuple(rows), chosen
-        self._fill()
+    def _why_not_swing(self) -> str:
+        """Return that the chosen tip is not among those that are searched."""
+        names, text, rows = self._names(), self._searched(), self._shown
+        if not text or any((row.pen, row.tip) == names for row in rows):
+            return ""
+        if rows:
+            return self.tr("Choose a tip in the table, or clear the search.")
+        words = self.tr("No tip matches {0}. Press Enter, or clear the search.")
+        return words.format(shortened(text))
+
+    def _names(self) -> tuple[str, str]:
+        names = self._selection.preparation.names
+        return names.pen, names.tip
+
+    def _first_amber(self) -> ReadinessItem | None:
+        return next((item for item in self._items() if item.is_amber), None)
+
+    def _items(self) -> tuple[ReadinessItem, ...]:
+        misfit = float(np.median(self._misfits)) if self._misfits else None
+        rate = self._live.settings.frame_rate if self._live.is_open else None
+        camera = CameraState(self._live.worst_connection, rate, misfit)
+        own = readiness(
+            self._selection.preparation, self._tips.statuses, camera, self._pens.doubt()
+        )
+        return (*own, *(item for each in self._services for item in each.readiness()))
+
+    def _searched(self) -> str:
+        return self._search.text().strip()
 
     def _fill(self) -> None:
         """Show the rows that match what is typed."""
-        text, is_all = self.search(), self._which.currentIndex() == 0
+        text, is_all = self._searched(), self._which.currentIndex() == 0
         self._shown = tuple(
             row
             for row in self._rows
@@ -292,7 +367,8 @@ class DayView(Translated, QWidget):
 
     def _on_narrowed(self) -> None:
         self._fill()
-        self.rows_changed.emit()
+        self._show_readiness()
+        self.changed.emit()
 
     def _cells(self, row: TipRow) -> list[QStandardItem]:
         texts = (row.tip, row.pen, row.due.text, row.uncertainty, row.age)
@@ -308,11 +384,11 @@ class DayView(Translated, QWidget):
     def _on_step_requested(self, step: str) -> None:
         """Go to a step, or to the setup on this one."""
         if step == "temperature":
-            self.take_temperature()
+            self._lead_to_temperature()
         else:
             self.step_requested.emit(step)
 
-    def take_temperature(self) -> None:
+    def _lead_to_temperature(self) -> None:
         """Lead to the question, or to where an answer is changed."""
         if self._asking.isHidden():
             self.setup_requested.emit()
@@ -322,14 +398,39 @@ class DayView(Translated, QWidget):
 
     def _on_answered(self) -> None:
         if not is_refusing(self._asking):
-            self.temperature_entered.emit(self._temperature.temperature())
+            now, answer = self._selection.preparation, self._temperature.temperature()
+            self._selection.set_preparation(now.with_temperature(answer))
 
     def _on_row_changed(self, now: QModelIndex) -> None:
         if now.isValid() and now.row() < len(self._shown):
             row = self._shown[now.row()]
             if (row.pen, row.tip) != self._chosen:
-                self.tip_chosen.emit(row.pen, row.tip)
+                self._choose(row.pen, row.tip)
 
-    @override
-    def _refresh(self) -> None:
-        self._fill()
+    def _on_selected(self, before: Preparation) -> None:
+        now = self._selection.preparation
+        if now.pen is not before.pen or now.camera is not before.camera:
+            self._misfits.clear()
+        self._refresh()
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        detection = shown.seen.detection
+        if detection is not None and detection.has_pose:
+            self._misfits.append(detection.sigma)
+
+    def _choose(self, pen: str, tip: str) -> None:
+        now, listed = self._selection.preparation, self._tips.library.tip(tip)
+        chosen = now.renamed(replace(now.names, pen=pen, tip=tip))
+        if listed is not None:
+            chosen = chosen.with_listed(listed)
+        self._selection.set_preparation(chosen)
+
+    def _on_tip_entered(self, text: str) -> None:
+        """Choose the only tip that matches; else find it in the library."""
+        rows = self._shown
+        exact = [row for row in rows if row.tip.casefold() == text.casefold()]
+        matching = exact or [row for row in rows if row.matches(text)]
+        if len(matching) == 1:
+            self._choose(matching[0].pen, matching[0].tip)
+        else:
+            self.code_entered.emit(text)

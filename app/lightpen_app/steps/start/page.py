@@ -8,14 +8,12 @@ from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.start.day_control import DayControl
 from lightpen_app.steps.start.day_view import DayView
-from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.library_control import EntryPresenter, LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
-from lightpen_app.steps.start.result_panel import LastResultPanel, LastResultPresenter
-from lightpen_app.steps.start.setup_view import SetupView, WelcomeControl, WelcomeView
+from lightpen_app.steps.start.result_panel import LastResultPanel
+from lightpen_app.steps.start.setup_view import SetupView, WelcomeView
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.fitting import PageScroll, ResponsiveLayout
 from lightpen_app.widgets.page import MainAction, Page
@@ -38,31 +36,25 @@ class StartPage(ResponsiveLayout, Page):
 
         # Widgets: the order of making them is the order of the Tab key
         self._unknown_code = QuestionBar()
-        self._interrupted = InterruptedPanel()
-        self._day = DayView()
+        self._unfinished = InterruptedPanel(
+            workbench, services, lambda: self._entries.settle()
+        )
+        self._day = DayView(workbench, services)
         is_known = bool(workbench.selection.stations())
         self._setup = setup = SetupView(workbench, is_known=is_known)
-        self._welcome = WelcomeView(offers_trial=workbench.around.simulator is not None)
-        self._begin = WelcomeControl(workbench, self._welcome, self)
-        self._result = LastResultPanel(workbench.around.now, bool(verify))
+        self._welcome = WelcomeView(workbench)
+        self._last = LastResultPanel(workbench, can_verify=bool(verify))
         self._views = QStackedWidget()
         self._all_limits = LimitsControl(workbench, self)
         self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
-        self._unfinished = InterruptedControl(
-            workbench, services, self._interrupted, lambda: self._entries.settle(), self
-        )
-        self._last = LastResultPresenter(
-            self._selection, workbench.run, self._tips, self._result
-        )
         self._entries = EntryPresenter(
             self._selection, self._library, setup.names, setup.limits, setup.assumed
         )
-        self._control = DayControl(workbench, services, self._library, self._day)
 
         # Layout
-        bars = self._unknown_code, self._interrupted
+        bars = self._unknown_code, self._unfinished
         vertical_layout(self, *bars, (self._views, 1), spacing=2 * GRID)
-        fill(self._day.side, self._result, 1)
+        fill(self._day.side, self._last, 1)
         for each in (self._day, setup, self._welcome):
             scroll = PageScroll()
             scroll.setWidget(each)
@@ -73,14 +65,15 @@ class StartPage(ResponsiveLayout, Page):
         setup.names.station_entered.connect(self.show_missing_input)
         setup.limits.all_requested.connect(self._all_limits.open)
         setup.welcome_requested.connect(self.show_welcome)
-        self._begin.trial_ready.connect(lambda: self.step_requested.emit("swing"))
-        self._begin.trial_awaited.connect(self.show_welcome)
-        self._begin.station_begun.connect(self.show_setup)
+        self._welcome.trial_ready.connect(lambda: self.step_requested.emit("swing"))
+        self._welcome.trial_awaited.connect(self.show_welcome)
+        self._welcome.station_begun.connect(self.show_setup)
         setup.folder.change_requested.connect(self.data_folder_requested)
         setup.done.connect(self.show_day)
         self._day.setup_requested.connect(self.show_setup)
-        self._control.changed.connect(self.changed)
-        self._control.step_requested.connect(self.step_requested)
+        self._day.changed.connect(self.changed)
+        self._day.step_requested.connect(self.step_requested)
+        self._day.code_entered.connect(self._library.take_code)
         self._entries.edited.connect(self._show_entries)
         self._unfinished.step_requested.connect(self.step_requested)
         self._last.verification_requested.connect(self._entries.settle)
@@ -123,14 +116,14 @@ class StartPage(ResponsiveLayout, Page):
             why_not = self.tr("Choose how to begin.")
         if not self.is_day:
             return MainAction(self.tr("Continue to the camera"), why_not)
-        action = self._control.main_action()
+        action = self._day.main_action()
         return MainAction(action.text, why_not or action.why_not)
 
     @override
     def run_main_action(self) -> None:
         self._entries.settle()
         if self.is_day:
-            self._control.run_main_action()
+            self._day.run_main_action()
         else:
             super().run_main_action()
 
@@ -155,17 +148,17 @@ class StartPage(ResponsiveLayout, Page):
         self._last.look_up()
         if not self._entries.typed().start_missing_inputs():
             self.show_day()
-        self._control.start()
+        self._day.start()
 
     @override
     def left(self) -> None:
-        self._control.stop()
+        self._day.stop()
         self._entries.settle()
         self._entries.forget_typed()
 
     @override
     def shut_down(self) -> None:
-        self._control.stop()
+        self._day.stop()
         for each in (self._unfinished, self._last, self._all_limits):
             each.shut_down()
 
@@ -210,10 +203,7 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def _refresh(self) -> None:
-        self._begin.refresh()
-        self._last.show_status()
         self._library.refresh()
-        self._control.refresh()
         self._show_entries()
 
     def _show_entries(self) -> None:

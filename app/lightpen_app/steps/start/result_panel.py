@@ -1,14 +1,14 @@
 """The current tip of a pen and probe tip, and its age."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGroupBox
+from typing_extensions import override
 
 from lightpen.local_time import local_time
-from lightpen.model.limits import DueRule
 from lightpen.model.names import Origin
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import TipStatus
@@ -28,34 +28,21 @@ from lightpen_app.widgets.state_banner import (
 )
 from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import LatestJob
-from lightpen_app.work.library_watch import LibraryWatch
-from lightpen_app.work.selection import Selection
-from lightpen_app.work.swing_run import SwingRun
-
-
-@dataclass(frozen=True, eq=False)
-class LastResult:
-    """Data of the current tip."""
-
-    result: Result | None = None  # None before the first
-    is_named: bool = True  # whether pen and tip are named at all
-    fault: str = ""  # why it is unknown; else empty
-    is_simulated: bool = False
+from lightpen_app.work.workbench import Workbench
 
 
 class LastResultPanel(Translated, QGroupBox):
     """Shows the last accepted calibration: age, verdict, tip and uncertainty."""
 
-    # Result, str, Signature or None: result to revoke, and reason.
-    take_back_requested = Signal(object, str, object)
     verification_requested = Signal()  # verify the displayed tip
 
-    def __init__(self, now: Callable[[], datetime], can_verify: bool = True) -> None:
+    def __init__(self, workbench: Workbench, *, can_verify: bool = True) -> None:
         super().__init__()
-        self._now = now
-        self._value = LastResult()
-        self._rule = DueRule()
-        self._marked: TipStatus | None = None
+        self._selection, self._run = workbench.selection, workbench.run
+        self._library, self._now = workbench.library, workbench.around.now
+        self._result: Result | None = None
+        self._fault = ""  # why it is unknown
+        self._lookup = LatestJob(self)
 
         # Widgets
         self._age = text_label(TextSize.TITLE)
@@ -70,17 +57,15 @@ class LastResultPanel(Translated, QGroupBox):
         self._verify = self.make_button(
             self.tr("Verify tip"), self.verification_requested
         )
-        if not can_verify:
-            self._verify.hide()
-        self._take_back = self.make_button(
+        self._can_verify = can_verify
+        self._revoke = self.make_button(
             self.tr("Revoke acceptance..."),
-            self._ask_to_take_back,
+            self._ask_to_revoke,
             tip=self.tr(
                 "Reinstate the previous result. Both results stay in the archive."
             ),
         )
         self._withdrawal = WithdrawalBar()
-        self._is_guarded = False
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
@@ -89,44 +74,62 @@ class LastResultPanel(Translated, QGroupBox):
         horizontal_layout(layout, self._age, *marks, 1, spacing=2 * GRID)
         fill(layout, self._when, self._table, self._origin, self._reason)
         fill(layout, self._warning)
-        horizontal_layout(layout, self._verify, self._take_back, 1)
+        horizontal_layout(layout, self._verify, self._revoke, 1)
         fill(layout, self._withdrawal)
 
         # Connections
         self._withdrawal.given.connect(self._on_given)
-        self._withdrawal.declined.connect(self._take_back.setFocus)
+        self._withdrawal.declined.connect(self._revoke.setFocus)
+        self._selection.changed.connect(self._on_selected)
+        self._library.changed.connect(self._refresh)
+        self._run.result_changed.connect(self.look_up)
 
         self._refresh()
 
-    def set_value(self, value: LastResult) -> None:
-        """Show another result, or why there is none."""
-        self._value = value
+    def set_value(self, result: Result | None, fault: str = "") -> None:
+        """Show another result, or why it is unknown."""
+        self._result, self._fault = result, fault
         self._withdrawal.hide()
         self._refresh()
 
-    def set_rule(self, rule: DueRule) -> None:
-        """Set the calibration interval."""
-        if rule != self._rule:
-            self._rule = rule
-            self._refresh()
+    def look_up(self) -> None:
+        """Read the current result."""
+        self._look_up(self.set_value)
 
-    def set_status(self, status: TipStatus | None) -> None:
-        """Mark a tip that must not be used for measuring; None if unknown."""
-        self._marked = None if status is TipStatus.VALID else status
-        self._status.set_value(status_message(self._marked))
+    def shut_down(self) -> None:
+        """Stop."""
+        self._lookup.cancel()
 
-    def set_why_unverified(self, why_not: str) -> None:
-        """Disable verification with a reason, or enable it."""
-        tooltip = self.tr(
-            "Half a minute: leave the tip in the cone and lean the pen to six sides."
+    def _look_up(self, show: Callable[[Result | None], None]) -> None:
+        self.shut_down()
+        pen, tip, is_simulated = _key(self._selection.preparation)
+        if not (pen and tip):
+            self.set_value(None)
+            return
+        archive, unknown = self._run.archive, self.tr("Last calibration not available")
+        self._lookup.start(
+            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated),
+            show,
+            partial(self.set_value, None),
+            crashed=lambda: self.set_value(None, unknown),
         )
-        self._verify.set_why_not(why_not, tooltip)
+
+    def _on_selected(self, before: Preparation) -> None:
+        self._refresh()
+        if _key(self._selection.preparation) != _key(before):
+            self._look_up(self._on_other_found)
+
+    def _on_other_found(self, result: Result | None) -> None:
+        self.set_value(result)
+        if result is not None:
+            completed = self._selection.preparation.completed(result)
+            self._selection.set_preparation(completed)
 
     def words(self) -> tuple[str, ...]:
         """Return the texts, line by line."""
         marks = [each.value().text for each in (self._grade, self._status)]
         lines = [self._age.text(), *marks, self._when.text()]
-        if self._value.result is not None:
+        if self._result is not None:
             shown = self._table.value()
             rows = zip(shown.rows, shown.cells, strict=True)
             lines += [" ".join((axis, *cells)) for axis, cells in rows]
@@ -134,25 +137,34 @@ class LastResultPanel(Translated, QGroupBox):
         lines += [remark.value().text for remark in remarks]
         return tuple(filter(None, lines))
 
+    @override
     def _refresh(self) -> None:
-        value = self._value
+        now, result = self._selection.preparation, self._result
+        pen, tip, is_simulated = _key(now)
         self.setTitle(
             self.tr("Last practice with this pen and tip")
-            if value.is_simulated
+            if is_simulated
             else self.tr("Last calibration of this pen and tip")
         )
-        self._status.set_value(status_message(self._marked))
-        for button in (self._verify, self._take_back):
-            button.setVisible(value.result is not None)
-        if value.result is not None:
-            self._show(value.result)
-        elif value.fault:
-            self._say(fault=value.fault)
-        elif value.is_named:
+        status = None if is_simulated else self._library.statuses.of_tip(pen, tip)
+        self._status.set_value(
+            status_message(None if status is TipStatus.VALID else status)
+        )
+        tooltip = self.tr(
+            "Half a minute: leave the tip in the cone and lean the pen to six sides."
+        )
+        self._verify.set_why_not(first_missing(now.missing_inputs()), tooltip)
+        self._verify.setVisible(result is not None and self._can_verify)
+        self._revoke.setVisible(result is not None)
+        if result is not None:
+            self._show(result)
+        elif self._fault:
+            self._say(fault=self._fault)
+        elif pen and tip:
             self._say(
                 self.tr("No result yet"),
                 self.tr("Accepted practice results are stored apart from real pens.")
-                if value.is_simulated
+                if is_simulated
                 else self.tr("The first accepted result becomes the current tip."),
             )
         else:
@@ -201,25 +213,30 @@ class LastResultPanel(Translated, QGroupBox):
             text = text.format(shortened(result.supervisor), result.reason)
         return StatusMessage.warning(text)
 
-    def set_guarded(self, is_guarded: bool) -> None:
-        """Ask for a supervisor before an acceptance is revoked, or for none."""
-        self._is_guarded = is_guarded
-
-    def _ask_to_take_back(self) -> None:
-        self._withdrawal.ask(of_supervisor=self._is_guarded)
+    def _ask_to_revoke(self) -> None:
+        is_guarded = self._selection.supervision.is_guarded
+        self._withdrawal.ask(of_supervisor=is_guarded)
 
     def _on_given(self, reason: str, signature: Signature | None) -> None:
-        self.take_back_requested.emit(self._value.result, reason, signature)
+        result, operator = self._result, self._selection.preparation.names.operator
+        if result is not None:
+            self._run.runner.ask(
+                lambda workflow: workflow.solving.revoke(
+                    result, operator, reason, signature
+                )
+            )
 
     def _warning_of(self, result: Result, now: datetime) -> StatusMessage:
+        due = self._selection.limits.due
+        rule = self._library.library.rule_of(result.names.tip, due)
         if result.accepted > now:
             text = self.tr(
                 "Calibration date is in the future. Check the clock of this computer."
             )
-        elif now > self._rule.due(result.accepted):
+        elif now > rule.due(result.accepted):
             text = self.tr(
                 "Calibration is older than {0} days. Calibrate before you measure."
-            ).format(self._rule.max_days)
+            ).format(rule.max_days)
         else:
             return StatusMessage()
         return StatusMessage.warning(text)
@@ -229,93 +246,6 @@ class LastResultPanel(Translated, QGroupBox):
         if days < 0:
             return self.tr("In the future")
         return age_text(days)
-
-
-class LastResultPresenter(QObject):
-    """Shows the last result of the selected tip."""
-
-    verification_requested = Signal()  # verify the displayed tip
-
-    def __init__(
-        self,
-        selection: Selection,
-        run: SwingRun,
-        library: LibraryWatch,
-        panel: LastResultPanel,
-    ) -> None:
-        super().__init__(panel)
-        self._selection, self._run, self._library = selection, run, library
-        self._panel = panel
-        self._lookup = LatestJob(self)
-
-        # Connections
-        selection.changed.connect(self._on_selected)
-        library.changed.connect(self.show_status)
-        run.result_changed.connect(self.look_up)
-        panel.take_back_requested.connect(self._on_take_back_requested)
-        panel.verification_requested.connect(self.verification_requested)
-
-        self.show_status()
-
-    def look_up(self) -> None:
-        """Read the current result."""
-        self._look_up(lambda result: None)
-
-    def shut_down(self) -> None:
-        """Stop."""
-        self._lookup.cancel()
-
-    def _look_up(self, use: Callable[[Result | None], None]) -> None:
-        self.shut_down()
-        pen, tip, is_simulated = _key(self._selection.preparation)
-        if not (pen and tip):
-            self._panel.set_value(LastResult(is_named=False))
-            return
-        archive = self._run.archive
-
-        def show(result: Result | None) -> None:
-            self._panel.set_value(LastResult(result, is_simulated=is_simulated))
-            use(result)
-
-        self._lookup.start(
-            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated),
-            show,
-            self._on_failed,
-            crashed=lambda: self._on_failed(self.tr("Last calibration not available")),
-        )
-
-    def _fill_in(self, result: Result | None) -> None:
-        if result is not None:
-            completed = self._selection.preparation.completed(result)
-            self._selection.set_preparation(completed)
-
-    def _on_failed(self, sentence: str) -> None:
-        self._panel.set_value(LastResult(fault=sentence))
-
-    def _on_selected(self, before: Preparation) -> None:
-        self.show_status()
-        if _key(self._selection.preparation) != _key(before):
-            self._look_up(self._fill_in)
-
-    def show_status(self) -> None:
-        """Mark the selected tip by its status."""
-        now, library = self._selection.preparation, self._library
-        self._panel.set_guarded(self._selection.supervision.is_guarded)
-        status = library.statuses.of_tip(now.names.pen, now.names.tip)
-        self._panel.set_status(None if now.origin is Origin.SIMULATED else status)
-        due = self._selection.limits.due
-        self._panel.set_rule(library.library.rule_of(now.names.tip, due))
-        self._panel.set_why_unverified(first_missing(now.missing_inputs()))
-
-    def _on_take_back_requested(
-        self, result: Result, reason: str, signature: Signature | None
-    ) -> None:
-        operator = self._selection.preparation.names.operator
-        self._run.runner.ask(
-            lambda workflow: workflow.solving.revoke(
-                result, operator, reason, signature
-            )
-        )
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from string import Template
 
-from PySide6.QtCore import QObject, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QSizePolicy, QWidget
 from typing_extensions import override
@@ -168,30 +168,34 @@ WORDS_HEIGHT = 21 * GRID  # px, with the margins
 class WelcomeView(Translated, QWidget):
     """Offers a trial, recorded images, or the set-up of a station."""
 
-    trial_requested = Signal()  # calibrate a simulated pen
-    images_chosen = Signal(str)  # folder of recorded images
-    station_requested = Signal()  # set up a station
+    trial_ready = Signal()  # it can be swung
+    trial_awaited = Signal()  # until its camera delivers an image
+    station_begun = Signal()  # and is to be set up
 
-    def __init__(self, *, offers_trial: bool) -> None:
+    def __init__(self, workbench: Workbench) -> None:
         super().__init__()
+        self._selection, self._run = workbench.selection, workbench.run
+        self._camera, self._files = workbench.camera, workbench.files
 
         # Widgets
-        self.trial = _Card(_Drawing("trial"))
+        self._trial = _Card(_Drawing("trial"))
         self._images = _Card(_Drawing("images"))
         self._station = _Card(_Drawing("station"))
 
         # Layout
         layout = vertical_layout(self)
-        self._cards = (self.trial,) * offers_trial + (self._images, self._station)
+        trials = (self._trial,) if workbench.around.simulator is not None else ()
+        self._cards = (*trials, self._images, self._station)
         self.first: QWidget = self._cards[0]
         cards = ((each, 1) for each in self._cards)
         horizontal_layout(layout, *cards, spacing=3 * GRID)
         layout.addStretch(1)
 
         # Connections
-        self.trial.clicked.connect(self.trial_requested)
+        self._trial.clicked.connect(lambda: self._files.use_trial(self._begin_trial))
         self._images.clicked.connect(self._on_images_clicked)
-        self._station.clicked.connect(self.station_requested)
+        self._station.clicked.connect(lambda: self._begin_station())
+        self._run.changed.connect(self._show_whether_free)
 
         self._refresh()
 
@@ -204,7 +208,7 @@ class WelcomeView(Translated, QWidget):
         dialog = QFileDialog(self, self.tr("Folder of the recorded images"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.fileSelected.connect(self.images_chosen)
+        dialog.fileSelected.connect(self._begin_station)
         dialog.open()
 
     def lead(self) -> str:
@@ -216,7 +220,7 @@ class WelcomeView(Translated, QWidget):
         )
 
     def _refresh(self) -> None:
-        self.trial.set_words(
+        self._trial.set_words(
             self.tr("Try it with a simulated pen"),
             self.tr("The whole procedure without pen, camera or any entry."),
         )
@@ -228,6 +232,30 @@ class WelcomeView(Translated, QWidget):
             self.tr("Set up my station"),
             self.tr("Enter pen and tip, and choose the camera."),
         )
+        self._show_whether_free()
+
+    def _show_whether_free(self) -> None:
+        """Show whether a trial can begin."""
+        is_on = self._run.status.state is not None
+        self._trial.set_why_not(self.tr("A swing is in progress.") if is_on else "")
+
+    def _begin_trial(self) -> None:
+        if not self._camera.live.is_open:
+            self.trial_awaited.emit()
+            self._camera.open()
+        elif is_trial_ready(self._selection.preparation) and self.isVisible():
+            self.trial_ready.emit()
+
+    def _begin_station(self, images: str = "") -> None:
+        """Set up a station, with recorded images or without a source."""
+        names = self._selection.preparation.names
+        if names.station in ("", TRIAL.station):
+            self._selection.begin_station()
+        if images:
+            source = SourceChoice(SourceKind.RECORDED, images)
+            chosen = self._selection.preparation.with_source(source)
+            self._selection.set_preparation(chosen)
+        self.station_begun.emit()
 
 
 class _Card(PushButton):
@@ -274,50 +302,3 @@ class _Drawing(QWidget):
         colors = asdict(colors_of(self.palette()))
         with QPainter(self) as painter:
             draw_svg(painter, QRectF(self.rect()), self._picture.substitute(colors))
-
-
-class WelcomeControl(QObject):
-    """Begins a trial or a station."""
-
-    trial_ready = Signal()
-    trial_awaited = Signal()  # until its camera delivers an image
-    station_begun = Signal()
-
-    def __init__(
-        self, workbench: Workbench, view: WelcomeView, parent: QObject
-    ) -> None:
-        super().__init__(parent)
-        self._selection, self._run = workbench.selection, workbench.run
-        self._camera, self._view = workbench.camera, view
-
-        # Connections
-        view.trial_requested.connect(
-            lambda: workbench.files.use_trial(self._begin_trial)
-        )
-        view.images_chosen.connect(self._begin_station)
-        view.station_requested.connect(self._begin_station)
-        workbench.run.changed.connect(self.refresh)
-
-    def refresh(self) -> None:
-        """Show whether a trial can begin."""
-        is_on = self._run.status.state is not None
-        why_not = self.tr("A swing is in progress.") if is_on else ""
-        self._view.trial.set_why_not(why_not)
-
-    def _begin_trial(self) -> None:
-        if not self._camera.live.is_open:
-            self.trial_awaited.emit()
-            self._camera.open()
-        elif is_trial_ready(self._selection.preparation) and self._view.isVisible():
-            self.trial_ready.emit()
-
-    def _begin_station(self, images: str = "") -> None:
-        """Set up a station, with recorded images or without a source."""
-        names = self._selection.preparation.names
-        if names.station in ("", TRIAL.station):
-            self._selection.begin_station()
-        if images:
-            source = SourceChoice(SourceKind.RECORDED, images)
-            chosen = self._selection.preparation.with_source(source)
-            self._selection.set_preparation(chosen)
-        self.station_begun.emit()

@@ -8,15 +8,18 @@ from pytestqt.qtbot import QtBot
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
 from lightpen.detection.inspection import AutoExposure, Exposure, ExposureState
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel
+from lightpen_app.work.workbench import Workbench
 
 
 def said(panel: ExposurePanel) -> list[str]:
     return [label.text() for label in panel.findChildren(QLabel)]
 
 
-def test_what_an_adjustment_came_to_is_said_as_long_as_it_is_true(qtbot: QtBot) -> None:
+def test_what_an_adjustment_came_to_is_said_as_long_as_it_is_true(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
     settings = CameraSettings(exposure_us=900.0)
-    panel = ExposurePanel()
+    panel = ExposurePanel(workbench.live)
     qtbot.addWidget(panel)
     panel.set_camera(
         CameraCapabilities(200, 160, ("Mono8",), Range(10.0, 1e5)), settings

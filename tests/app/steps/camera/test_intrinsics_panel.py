@@ -13,6 +13,7 @@ from lightpen.formats.opened_files import CameraFile
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, solve_record
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.work.workbench import Workbench
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +22,8 @@ def solution(swung: Callable[..., Path]) -> Solution:
 
 
 @pytest.fixture
-def panel(qtbot: QtBot, solution: Solution) -> IntrinsicsPanel:
-    panel = IntrinsicsPanel()
+def panel(qtbot: QtBot, workbench: Workbench, solution: Solution) -> IntrinsicsPanel:
+    panel = IntrinsicsPanel(workbench.selection)
     qtbot.addWidget(panel)
     panel.set_value(CameraFile.read(solution.source.camera_files[0]))
     return panel

@@ -205,7 +205,7 @@ def test_a_rig_file_that_cannot_be_read_is_reported_where_it_was_chosen(
     live.wait("Baseline")
     (tmp_path / "rig.json").write_text("{}")
     panel = live.child(RigPanel)
-    panel.path_chosen.emit(str(tmp_path / "rig.json"))
+    panel._path.take(str(tmp_path / "rig.json"))
 
     live.until(lambda: "cameras" in panel._problem.value().text)
     assert panel._problem.value().tone is Tone.BAD
@@ -782,8 +782,11 @@ def test_without_a_pen_file_the_operator_is_asked_whether_it_is_covered(
     seen.wait("Bright spots: 10. Is the pen covered?")
 
 
-def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
-    panel = StrayLightPanel()
+def test_what_shines_and_moves_is_no_stray_light(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    live = workbench.live
+    panel = StrayLightPanel(workbench.selection, live, LivePanel())
     qtbot.addWidget(panel)
     panel.set_live(True)
     (search,) = (b for b in panel.findChildren(QPushButton) if b.text() == "Search")
@@ -800,7 +803,7 @@ def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
         .value()
         .text.startswith("The bright spots move and are not stray light.")
     )
-    assert len(panel.found()) == 0
+    assert len(panel._found) == 0
 
 
 def test_a_grey_button_says_why(seen: "Seen") -> None:

@@ -341,7 +341,7 @@ def test_a_tip_has_its_ball_again_after_another_was_chosen_from_the_list(
     assert view is not None
     pen = workbench.selection.preparation.names.pen
 
-    view.tip_chosen.emit(pen, "T-99")
+    view._choose(pen, "T-99")
 
     qtbot.waitUntil(lambda: workbench.selection.preparation.names.ball_diameter == 5.0)
     assert workbench.selection.preparation.names.tip == "T-99"
@@ -986,7 +986,7 @@ def test_after_a_bug_the_swing_is_offered_as_before(
     broken_parts = [broken_part] + ["find_unfinished"] * also_searching
     with monkeypatch.context() as broken:
         for part in broken_parts:
-            name = f"lightpen_app.steps.start.interrupted_control.{part}"
+            name = f"lightpen_app.steps.start.interrupted_panel.{part}"
             broken.setattr(name, lambda *_: 1 / 0)
         start.press(word)
         if word == "Discard":
@@ -1110,12 +1110,18 @@ def test_every_label_leads_to_its_field(start: Opened) -> None:
 
 
 def test_a_station_without_a_temperature_is_offered_none_and_no_slip_confirms_one(
-    qtbot: QtBot,
+    workbench: Workbench, qtbot: QtBot
 ) -> None:
-    view, answers = DayView(), list[float | None]()
+    selection, answers = workbench.selection, list[float | None]()
+    live = selection.preparation.with_source(SourceChoice("aravis", "1"))
+    limits = SwingLimits(requires_temperature=True)
+    selection.set_preparation(replace(live, limits=limits))
+    selection.changed.connect(
+        lambda _: answers.append(selection.preparation.assumptions.temperature_c)
+    )
+    view = DayView(workbench, ())
     qtbot.addWidget(view)
-    view.temperature_entered.connect(answers.append)
-    view.set_question(None, is_asked=True)
+    view.start()
     view.show()
     (field,) = view.findChildren(TemperatureField)
     (confirm,) = (b for b in view.findChildren(QPushButton) if b.text() == "Confirm")
@@ -1132,6 +1138,7 @@ def test_a_station_without_a_temperature_is_offered_none_and_no_slip_confirms_on
 
     type_number(field, "21")
     assert answers == [None, 21.0]
+    view.stop()
 
 
 def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
@@ -1154,7 +1161,7 @@ def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
     start.type_into(name, "21.5", Key.Key_Return)
     assert not asked.isVisible()
     assert selection.preparation.assumptions_today.temperature_c == 21.5
-    reported = [item.message.text for item in view.readiness()]
+    reported = [item.message.text for item in view._ready.items()]
     assert "Pen at 21.5 \N{DEGREE SIGN}C" in reported
 
     # The next day the last answer is offered again, and none is one, too.
@@ -1168,4 +1175,4 @@ def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
     limits = SwingLimits(requires_temperature=True)
     selection.set_preparation(replace(selection.preparation, limits=limits))
     assert asked.isVisible()
-    assert "temperature" in [item.step for item in view.readiness() if item.is_amber]
+    assert "temperature" in [item.step for item in view._ready.items() if item.is_amber]

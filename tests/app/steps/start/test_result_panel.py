@@ -1,5 +1,6 @@
 """What the step Start says of the tip in force."""
 
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -11,25 +12,33 @@ from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.limits import DueRule
-from lightpen.record.library.supervision import Signature
+from lightpen.model.limits import DueRule, StationLimits
+from lightpen.record.library.supervision import PasswordVerifier, Signature, Supervision
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import Names
-from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
+from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.bars import WithdrawalBar
 from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.fields import SupervisorFields
+from lightpen_app.work.workbench import Workbench
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 
 
-def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
-    qtbot: QtBot, tmp_path: Path
-) -> None:
-    panel = LastResultPanel(lambda: NOON)
+@pytest.fixture
+def panel(qtbot: QtBot, workbench: Workbench) -> Iterator[LastResultPanel]:
+    panel = LastResultPanel(workbench)
     qtbot.addWidget(panel)
-    panel.set_value(LastResult(accepted(tmp_path)))
-    panel.set_guarded(True)
+    yield panel
+    panel.shut_down()
+
+
+def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
+    panel: LastResultPanel, workbench: Workbench, qtbot: QtBot, tmp_path: Path
+) -> None:
+    guard = Supervision(PasswordVerifier("0" * 32, "0" * 64))
+    workbench.selection.set_supervision(guard)
+    panel.set_value(accepted(tmp_path))
     panel.show()
     revoke = next(
         each
@@ -46,10 +55,9 @@ def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
     )
     for field, text in ((reason, "Bent."), (name, "Eve"), (password, "correct horse")):
         QTest.keyClicks(field, text)
-    with qtbot.waitSignal(panel.take_back_requested) as blocker:
+    with qtbot.waitSignal(bar.given) as blocker:
         QTest.keyClick(password, Qt.Key.Key_Return)
-    assert blocker.args is not None
-    assert blocker.args[1:] == ["Bent.", Signature("Eve", "correct horse")]
+    assert blocker.args == ["Bent.", Signature("Eve", "correct horse")]
 
 
 def accepted(folder: Path) -> Result:
@@ -69,17 +77,17 @@ def accepted(folder: Path) -> Result:
 
 
 def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
-    qtbot: QtBot, tmp_path: Path
+    panel: LastResultPanel, workbench: Workbench, tmp_path: Path
 ) -> None:
-    panel = LastResultPanel(lambda: NOON + timedelta(days=40))
-    qtbot.addWidget(panel)
-    panel.set_value(LastResult(accepted(tmp_path)))
+    panel._now = lambda: NOON + timedelta(days=40)
+    panel.set_value(accepted(tmp_path))
     assert (
         "Calibration is older than 30 days. Calibrate before you measure."
         in panel.words()
     )
 
-    panel.set_rule(DueRule(60))
+    limits = {"Hall 2": StationLimits(due=DueRule(60))}
+    workbench.selection.set_supervision(Supervision(limits=limits))
 
     assert not any("older than" in words for words in panel.words())
 
@@ -92,11 +100,10 @@ def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
     ],
 )
 def test_the_age_is_reported_in_words(
-    qtbot: QtBot, tmp_path: Path, days: int, age: str
+    panel: LastResultPanel, tmp_path: Path, days: int, age: str
 ) -> None:
-    panel = LastResultPanel(lambda: NOON + timedelta(days=days))
-    qtbot.addWidget(panel)
-    panel.set_value(LastResult(accepted(tmp_path)))
+    panel._now = lambda: NOON + timedelta(days=days)
+    panel.set_value(accepted(tmp_path))
 
     assert panel.words()[0] == age
     assert ("Check the clock" in panel.words()[-1]) is (days < 0)

@@ -19,7 +19,6 @@ from lightpen.local_time import local_now
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (
-    SWUNG,
     ItemKind,
     Library,
     ListedCone,
@@ -123,7 +122,9 @@ class Desk:
         raise AssertionError(name)
 
     def list_of(self, kind: ItemKind) -> ItemButton:
-        return self.page.findChildren(ItemButton)[list(SWUNG).index(kind)]
+        found = self.page.findChildren(ItemButton)
+        names = {each.accessibleName(): each for each in found}
+        return names[f"List of {kind.name.lower()}s"]
 
     def choices(self, kind: ItemKind) -> list[str]:
         return [each.text() for each in self.list_of(kind).menu().actions()]
