@@ -10,20 +10,18 @@ import re
 import sys
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
 import cv2
+import platformdirs
 from typing_extensions import override
 
 from lightpen import __version__
-from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.arguments import use_window
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import Desktop, add_desktop, add_open, is_absent
-from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.extension import Extension, Subcommand
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
@@ -46,6 +44,18 @@ COMMANDS = (
         "lightpen.commands.pen:add_pen",
     ),
 )
+OF_ARCHIVE = (
+    Subcommand(
+        "archive",
+        "check, list, deliver and fetch entries",
+        "lightpen.commands.archive:add_archive",
+    ),
+    Subcommand(
+        "tips",
+        "manage the library of pens, tips and cones",
+        "lightpen.commands.tips:add_tips",
+    ),
+)
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # Advice for the command line, by the message codes of the core.
@@ -61,6 +71,11 @@ ADVICE = {
 }
 
 _logger = logging.getLogger(__name__)
+
+
+def usual_data_folder() -> Path:
+    """Return the default data folder."""
+    return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
 def main(
@@ -185,24 +200,15 @@ def _parser(
     if desktop is not None:
         add_desktop(parser, desktop)
         add_open(added("open", "open a recorded swing"), desktop)
-    for each in (*COMMANDS, *(c for e in extensions for c in e.commands)):
+    folder = usual_data_folder if desktop is None else desktop.data_folder
+    of_extensions = (c for e in extensions for c in e.commands)
+    for each in (*COMMANDS, *of_extensions, *OF_ARCHIVE):
         command = added(each.name, each.purpose)
-        command.set_defaults(log_folder=usual_data_folder)
+        command.set_defaults(
+            log_folder=usual_data_folder, data_folder=folder, extensions=extensions
+        )
         if each.name in given:
             each.add_options(command)
-    data_folder = usual_data_folder if desktop is None else desktop.data_folder
-    for name, help_text, add_options in (
-        (
-            "archive",
-            "check, list, deliver and fetch entries",
-            partial(add_archive, extensions=extensions),
-        ),
-        ("tips", "manage the library of pens, tips and cones", add_tips),
-    ):
-        command = added(name, help_text)
-        command.set_defaults(log_folder=usual_data_folder)
-        if name in given:
-            add_options(command, data_folder)
     return parser, commands.choices
 
 

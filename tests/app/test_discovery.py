@@ -29,7 +29,7 @@ def test_both_panels_without_a_file_ask_for_the_swing(
 ) -> None:
     services = (Discovering(workbench),)
     intrinsics = IntrinsicsPanel(workbench.selection, services)
-    for panel in (intrinsics, LedFilePanel()):
+    for panel in (intrinsics, LedFilePanel(workbench)):
         qtbot.addWidget(panel)
         button = next(
             each

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
 
 from lightpen.commands.console import note
 from lightpen.errors import UsageError
@@ -14,8 +13,6 @@ from lightpen.formats.pen_tables import UNITS
 from lightpen.formats.rig_files import write_window
 from lightpen.messages import message
 from lightpen.record.library.supervision import Signature
-
-DataFolder: TypeAlias = Callable[[], Path]
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
@@ -94,10 +91,9 @@ def add_bits(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_data(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
+def add_data(parser: argparse.ArgumentParser) -> None:
     """Add ``--data``, a data folder; `data_of` reads it."""
     add_file(parser, "--data", "FOLDER", "data folder (default: that of the program)")
-    parser.set_defaults(data_folder=data_folder)
 
 
 def data_of(options: argparse.Namespace) -> Path:

@@ -19,6 +19,7 @@ from typing_extensions import override
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.widgets.bars import QuestionBar, ReasonBar
 from lightpen_app.widgets.fields import SupervisorFields
+from lightpen_app.work.workbench import Workbench
 
 
 @pytest.mark.parametrize("kind", [QuestionBar, ReasonBar])
@@ -50,15 +51,15 @@ def test_what_had_the_focus_before_a_question_has_it_again(
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda page: asked(QuestionBar(page)),
-        lambda page: asked(ReasonBar(page)),
-        lambda page: SupervisorFields(page).clear_password(),
-        lambda page: LedFilePanel(page).ask_units("leds.csv"),
+        lambda page, _: asked(QuestionBar(page)),
+        lambda page, _: asked(ReasonBar(page)),
+        lambda page, _: SupervisorFields(page).clear_password(),
+        lambda page, workbench: on_page(page, LedFilePanel(workbench)).ask_units("a"),
     ],
     ids=["question", "reason", "password", "units"],
 )
 def test_what_is_asked_on_a_page_that_is_not_shown_leaves_the_focus_where_it_is(
-    qtbot: QtBot, ask: Callable[[QWidget], None]
+    qtbot: QtBot, workbench: Workbench, ask: Callable[[QWidget, Workbench], None]
 ) -> None:
     pages, field, other = QStackedWidget(), QLineEdit(), QWidget()
     pages.addWidget(field)
@@ -69,9 +70,14 @@ def test_what_is_asked_on_a_page_that_is_not_shown_leaves_the_focus_where_it_is(
     field.setFocus()
     qtbot.waitUntil(field.hasFocus)
 
-    ask(other)
+    ask(other, workbench)
 
     assert field.hasFocus()
+
+
+def on_page(page: QWidget, panel: LedFilePanel) -> LedFilePanel:
+    panel.setParent(page)
+    return panel
 
 
 def asked(bar: QuestionBar | ReasonBar) -> None:

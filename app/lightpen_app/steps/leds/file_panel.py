@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QFileSystemWatcher, QObject, QTimer, Signal
+from PySide6.QtCore import QFileSystemWatcher, QTimer, Signal
 from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 
 from lightpen.formats.opened_files import PenFile
@@ -13,7 +13,7 @@ from lightpen.formats.pen_tables import UNITS
 from lightpen.messages import Message
 from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import OpenedPen, open_pen, save_pen
-from lightpen.swing.preparation import Preparation
+from lightpen.swing.preparation import Preparation, SourceKind
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID
@@ -22,26 +22,28 @@ from lightpen_app.widgets.controls import FileDrops, ask_file, give_focus
 from lightpen_app.widgets.fields import ChoiceField, PathField, Translated
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 from lightpen_app.work.job import LatestJob, Report
-from lightpen_app.work.library_watch import PenFiles
-from lightpen_app.work.selection import Selection
+from lightpen_app.work.workbench import Workbench
 
 REREAD_MS = 500  # until a program that saves a file has written it whole
 
 
 class LedFilePanel(Translated, QWidget):
-    """Path and buttons, with messages and questions about the file."""
+    """Opens the files that are chosen, and again once they have changed."""
 
-    path_chosen = Signal(str)  # path of the file to open
-    # The path of a file that does not say its units, and the units.
-    units_chosen = Signal(str, str)
-    samples_requested = Signal()  # use the file of the simulated pen
+    changed = Signal()  # `opened` is another
     discovery_requested = Signal()  # no such file: find the LEDs by a swing
 
-    def __init__(
-        self, parent: QWidget | None = None, *, can_discover: bool = True
-    ) -> None:
-        super().__init__(parent)
-        self._value = self._unit_asked = ""
+    def __init__(self, workbench: Workbench, *, can_discover: bool = True) -> None:
+        super().__init__()
+        self._selection, self._pens = workbench.selection, workbench.pens
+        self._notices = workbench.notifications
+        self._unit_asked = ""
+        self._opened: OpenedPen | None = None
+        self._refusal: Callable[[], str] = str
+        self._job = LatestJob(self)
+        self._watcher = QFileSystemWatcher(self)
+        self._is_stale = False  # the file has changed
+        self._waiting = QTimer(self, singleShot=True, interval=REREAD_MS)
 
         # Widgets
         label = self.say(QLabel(), self.tr("LED &file"))
@@ -54,7 +56,7 @@ class LedFilePanel(Translated, QWidget):
             self.make_button(self.tr("Open..."), self._on_open_clicked)
         )
         self._samples = self.make_button(
-            self.tr("Use file of the simulated pen"), self.samples_requested
+            self.tr("Use file of the simulated pen"), workbench.files.use_samples
         )
         self._discover = self.make_button(
             self.tr("I have no such file..."),
@@ -83,30 +85,20 @@ class LedFilePanel(Translated, QWidget):
             layout.addWidget(each)
 
         # Connections
-        self._path.path_chosen.connect(self.path_chosen)
+        self._path.path_chosen.connect(lambda path: self._open(Path(path)))
         FileDrops(self).dropped.connect(self._path.take)
         self._units.textActivated.connect(self._on_units_chosen)
         self.question.declined.connect(self._on_declined)
+        self._selection.changed.connect(self._on_selection_changed)
+        self._selection.station_changed.connect(self._on_station_changed)
+        self._watcher.fileChanged.connect(self._on_file_changed)
+        self._waiting.timeout.connect(self.reread)
 
-        self._refresh()
+        self._on_selection_changed()
 
     def set_narrow(self, narrow: bool) -> None:
         """Place the buttons below the path, or beside it."""
         set_stacked(self._row, narrow)
-
-    def value(self) -> str:
-        """Return the path of the open file, not that being typed."""
-        return self._value
-
-    def set_value(self, path: str) -> None:
-        """Show the path of another file."""
-        self._value = path
-        self._path.set_value(path)
-
-    def set_problem(self, sentence: str) -> None:
-        """Set or clear the message."""
-        self._path.set_faulty(bool(sentence))
-        self._problem.set_value(StatusMessage.fault(sentence))
 
     def ask_units(self, name: str) -> None:
         """Ask for missing units; an empty text ends the question."""
@@ -127,10 +119,6 @@ class LedFilePanel(Translated, QWidget):
         cancel = self.tr("Cancel")
         self.question.ask_about(lambda: Question(*words(), cancel), agreed)
 
-    def set_has_samples(self, has_samples: bool) -> None:
-        """Offer the file of the simulated pen, or not."""
-        self._samples.setVisible(has_samples)
-
     def _on_open_clicked(self) -> None:
         self._path.pick(
             QFileDialog.FileMode.ExistingFile,
@@ -140,60 +128,32 @@ class LedFilePanel(Translated, QWidget):
 
     def _on_units_chosen(self, units: str) -> None:
         if units:
-            self.units_chosen.emit(self._path.value(), units)
+            self._open(Path(self._path.value()), units)
 
     def _on_declined(self) -> None:
         self.ask_units("")
-        self._path.set_value(self._value)
+        self._show_path()
 
     def _refresh(self) -> None:
         words = self.tr("{0} does not state the unit of its coordinates. Choose it:")
         self._units_words.set_value(
             StatusMessage.warning(words.format(self._unit_asked))
         )
-
-
-class LedFileControl(QObject):
-    """Opens files that the panel requests, and again once they have changed."""
-
-    changed = Signal()  # `opened` is another
-    status_changed = Signal(str)  # text of the status line
-
-    def __init__(
-        self, selection: Selection, pens: PenFiles, panel: LedFilePanel
-    ) -> None:
-        super().__init__(panel)
-        self._selection, self._pens, self._panel = selection, pens, panel
-        self._opened: OpenedPen | None = None
-        self._problem: Callable[[], str] = str
-        self._job = LatestJob(self)
-        self._watcher = QFileSystemWatcher(self)
-        self._is_stale = False  # the file has changed
-        self._waiting = QTimer(self, singleShot=True, interval=REREAD_MS)
-
-        # Connections
-        panel.path_chosen.connect(lambda path: self._open(Path(path)))
-        panel.units_chosen.connect(lambda path, units: self._open(Path(path), units))
-        selection.changed.connect(self._on_selection_changed)
-        selection.station_changed.connect(self._on_station_changed)
-        self._watcher.fileChanged.connect(self._on_file_changed)
-        self._waiting.timeout.connect(self.reread)
-
-        self._on_selection_changed()
+        refusal = self._refusal()
+        self._path.set_faulty(bool(refusal))
+        self._problem.set_value(StatusMessage.fault(refusal))
+        source = self._selection.preparation.source
+        self._samples.setVisible(source.kind == SourceKind.SIMULATED)
 
     @property
     def opened(self) -> OpenedPen | None:
         """The file in use; without one, one that cannot be used."""
         return self._opened
 
-    def retranslate(self) -> None:
-        """Update the message on the file."""
-        self._panel.set_problem(self._problem())
-
     def reread(self) -> None:
         """Open the file again if it has changed and the page is shown."""
         opened = self._opened
-        if self._is_stale and opened is not None and self._panel.isVisible():
+        if self._is_stale and opened is not None and self.isVisible():
             file = opened.file
             self._watch()
             self._open(opened.path, None if file is None else file.units)
@@ -203,7 +163,7 @@ class LedFileControl(QObject):
         assert self._opened is not None
         path = self._opened.path
         ask_file(
-            self._panel,
+            self,
             self.tr("Save the corrected LEDs"),
             path.with_name(self.tr("{0} corrected").format(path.stem) + ".json"),
             partial(self.save, pen),
@@ -214,8 +174,8 @@ class LedFileControl(QObject):
         self._start(lambda _: save_pen(pen, path), self._on_saved)
 
     def _open(self, path: Path, units: str | None = None) -> None:
-        self.status_changed.emit("")
-        self._panel.ask_units("")
+        self._notices.show_status("")
+        self.ask_units("")
         self._start(lambda _: open_pen(path, units), self._on_opened)
 
     def _start(
@@ -229,7 +189,7 @@ class LedFileControl(QObject):
     def _on_opened(self, opened: OpenedPen) -> None:
         if opened.file is not None and self._pens.doubt_about(opened.file):
             words = partial(self._doubt_question, opened.file)
-            self._panel.ask(words, partial(self._use, opened.file))
+            self.ask(words, partial(self._use, opened.file))
         elif opened.file is not None:
             self._use(opened.file)
         elif opened.pen is not None:
@@ -238,9 +198,9 @@ class LedFileControl(QObject):
             self._selection.set_preparation(replace(now, pen_file=None))
         elif opened.needs_units:
             self._set_problem(str)
-            self._panel.ask_units(opened.path.name)
+            self.ask_units(opened.path.name)
         else:
-            self._set_problem(partial(self._refusal, opened.problem))
+            self._set_problem(partial(self._refused, opened.problem))
 
     def _on_saved(self, opened: OpenedPen) -> None:
         if opened.file is None:
@@ -248,7 +208,7 @@ class LedFileControl(QObject):
             return
         self._use(opened.file)
         words = self.tr("LEDs saved as {0} and in use.")
-        self.status_changed.emit(words.format(opened.path.name))
+        self._notices.show_status(words.format(opened.path.name))
 
     def _use(self, file: PenFile) -> None:
         now = self._selection.preparation
@@ -259,28 +219,31 @@ class LedFileControl(QObject):
     def _show(self, opened: OpenedPen | None) -> None:
         self._opened = opened
         self._watch()
-        self._panel.ask_units("")
-        self._panel.set_value("" if opened is None else str(opened.path))
+        self.ask_units("")
+        self._show_path()
         problem = None if opened is None else opened.problem
         self._set_problem(partial(worded, problem))
         self.changed.emit()
 
     def _set_problem(self, problem: Callable[[], str]) -> None:
         """Show a message on the file in the selected language."""
-        self._problem = problem
-        self.retranslate()
+        self._refusal = problem
+        self._refresh()
 
     def _doubt_question(self, file: PenFile) -> tuple[str, str]:
         words = self.tr("{0} Use it for this pen from now on?")
         text = words.format(self._pens.doubt_about(file))
         return text, self.tr("Use this file")
 
-    def _refusal(self, why: Message | None) -> str:
+    def _refused(self, why: Message | None) -> str:
         """Return why a file cannot be opened, and which one is open."""
         if self._opened is None:
             return worded(why)
         kept = self.tr("{0} remains open.").format(self._opened.path.name)
         return f"{worded(why)} {kept}"
+
+    def _show_path(self) -> None:
+        self._path.set_value("" if self._opened is None else str(self._opened.path))
 
     def _watch(self) -> None:
         """Watch the open file, also one that has been put in place of another."""
@@ -294,6 +257,7 @@ class LedFileControl(QObject):
         self._waiting.start()
 
     def _on_selection_changed(self, before: Preparation | None = None) -> None:
+        self._refresh()
         file, shown = self._selection.preparation.pen_file, self._opened
         in_use = None if shown is None else shown.file
         if file is not in_use or before is None:

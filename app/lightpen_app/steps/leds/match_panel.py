@@ -2,22 +2,29 @@
 
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGroupBox
 from typing_extensions import override
 
+from lightpen.cameras.protocol import Connection
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import Spots
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
-from lightpen.pen_check.match import PenMatch
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.pen_check.match import PenMatch, add_view, match_pen
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import number_text
+from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
@@ -27,19 +34,98 @@ from lightpen_app.widgets.state_banner import (
     StateBanner,
     StatusMessage,
 )
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.workbench import Workbench
 
 N_SMOOTHED = 20  # images that are reported together: one second
 N_FINDINGS = 4
 TALLEST = 0.9  # height of the image over its width; sensors are flatter
+PERIOD_MS = 1000
+
+
+class PenWatch(QObject):
+    """Compares a pen with the detections, at most once a second."""
+
+    value_changed = Signal(object)  # PenMatch of the views so far; None until computed
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._camera: Camera | None = None
+        self._pen: Pen | None = None
+        self._views: tuple[Spots, ...] = ()
+        self._compared: tuple[Spots, ...] = ()
+        self._last: PenMatch | None = None
+        self._job = LatestJob(self)
+        self._timer = QTimer(self, interval=PERIOD_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._compare)
+
+    def set_pen(self, camera: Camera | None, pen: Pen | None) -> None:
+        """Compare with another pen; views of the same camera stay."""
+        if camera is not self._camera:
+            self._views = ()
+        if camera is self._camera and pen is self._pen:
+            return
+        self._camera, self._pen, self._last = camera, pen, None
+        self._forget()
+        self._compare()
+
+    def last_match(self, camera: Camera | None, pen: Pen | None) -> PenMatch | None:
+        """Return the last comparison of the pen; None without one."""
+        is_same = camera is self._camera and pen is self._pen
+        return self._last if is_same else None
+
+    def add(self, spots: Spots) -> None:
+        """Add the detection in an image."""
+        self._views = add_view(self._views, spots)
+
+    def start(self) -> None:
+        """Begin with no views."""
+        self._views = ()
+        self._forget()
+        self._timer.start()
+
+    def stop(self) -> None:
+        """Compare no more."""
+        self._timer.stop()
+        self._job.cancel()
+
+    def _forget(self) -> None:
+        self._compared = ()
+        self._job.cancel()
+        self.value_changed.emit(None)
+
+    def _compare(self) -> None:
+        camera, pen, views = self._camera, self._pen, self._views
+        if camera is None or pen is None or not views or self._job.is_running:
+            return
+        if views is self._compared:
+            return
+        self._compared = views
+        self._job.start(
+            lambda report: match_pen(camera, pen, views),
+            self._on_compared,
+            # The views after these are compared again.
+            crashed=lambda: self.value_changed.emit(None),
+        )
+
+    def _on_compared(self, match: PenMatch) -> None:
+        self._last = match
+        self.value_changed.emit(match)
 
 
 class MatchPanel(Translated, QGroupBox):
-    """Shows images with numbered LEDs and the match of each."""
+    """Shows live images with numbered LEDs, and how the pen of the open file fits."""
 
-    def __init__(self) -> None:
+    def __init__(self, workbench: Workbench, leds: LedFilePanel) -> None:
         super().__init__()
         self.say(self, self.tr("Live match"))
+        self._leds, self._selection = leds, workbench.selection
+        self._run, self._live = workbench.run, workbench.live
+        self._is_shown = False
+        self.watch = PenWatch(self)
         self._match: PenMatch | None = None
         self._detection: PenDetection | None = None
         self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)
@@ -60,6 +146,13 @@ class MatchPanel(Translated, QGroupBox):
 
         # Layout
         vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0)
+
+        # Connections
+        leds.changed.connect(self._on_file_changed)
+        self._selection.changed.connect(self._set_region)
+        self._live.image_shown.connect(self._on_image_shown)
+        self._live.connection_changed.connect(self._on_connection_changed)
+        self._live.other_changed.connect(self._on_connection_changed)
 
         self._refresh()
 
@@ -83,34 +176,94 @@ class MatchPanel(Translated, QGroupBox):
         self.view.clear()
         self._refresh_state()
 
-    def set_why_unknown(self, sentence: str) -> None:
-        """Show the missing inputs of the pen detection."""
-        if sentence != self._why_none:
-            self._why_none = sentence
-            self._refresh()
+    def start(self) -> None:
+        """Detect the pen of the open file from now on."""
+        self._is_shown = True
+        self.clear()
+        self.watch.start()
+        self._live.show_pen()
+        self._set_region()
+        self._turn_simulated_pen()
 
-    def set_has_frame(self, has_frame: bool) -> None:
-        """Set whether the pen is in its frame; a match alone does not suffice."""
-        if has_frame != self._has_frame:
-            self._has_frame = has_frame
-            self._refresh()
+    def stop(self) -> None:
+        """Stop; detect the pen in use again."""
+        self._is_shown = False
+        self.watch.stop()
+        if not self._run.status.is_capturing:
+            self._live.set_region(self._selection.preparation.region)
+            if self._live.operator is not None:
+                self._live.operator.hold()
 
-    def set_swung(self, is_swung: bool) -> None:
-        """Set whether the pen of a swing is being detected instead."""
-        if is_swung != self._is_swung:
-            self._is_swung = is_swung
+    def _turn_simulated_pen(self) -> None:
+        """Show a simulated pen from all sides, as an operator turns a real one."""
+        if self._is_shown and self._live.operator is not None:
+            self._live.operator.swing()
+
+    def doubt(self) -> str:
+        """Return why the file may belong to another pen; empty if it fits."""
+        camera = self._selection.preparation.camera
+        match = self.watch.last_match(camera, self._sought())
+        if match is None or not match.findings:
+            return ""
+        return worded(match.findings[0].message)
+
+    def _why_unknown(self) -> str:
+        """Return the missing inputs of the pen detection."""
+        preparation = self._selection.preparation
+        if not self._live.is_open:
+            return self.tr("No camera is open. See the step Camera.")
+        if self._live.worst_connection is Connection.LOST:
+            return self.tr("Camera connection lost. Reconnecting automatically.")
+        if preparation.camera is None:
+            return self.tr("Intrinsics file missing. See the step Camera.")
+        if self._sought() is None:
+            return self.tr("Open the LED file first.")
+        return ""
+
+    def _sought(self) -> Pen | None:
+        opened = self._leds.opened
+        return None if opened is None else opened.sought
+
+    def _on_file_changed(self) -> None:
+        opened = self._leds.opened
+        self._has_frame = opened is None or not opened.problem
+        self._set_region()
+        self._refresh()
+
+    def _set_region(self) -> None:
+        """Set the region of interest for the pen of the open file, if it is shown."""
+        if not self._is_shown:
+            return
+        preparation = self._selection.preparation
+        pen, status = self._sought(), self._run.status
+        self.watch.set_pen(preparation.camera, pen)
+        swung = status.setup if status.is_capturing else None
+        self._is_swung = swung is not None and _differ(swung.pen, pen)
+        if not status.is_capturing:
+            region = preparation.region
+            if preparation.pen_file is None:
+                region = replace(region, pen=pen)
+            self._live.set_region(region)
+        self._refresh()
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        is_live = self._live.worst_connection is Connection.STREAMING
+        if self._is_shown and is_live:  # the last image comes after the loss
+            self.set_image(shown)
+            self.watch.add(shown.seen.spots)
+
+    def _on_connection_changed(self) -> None:
+        self._turn_simulated_pen()
+        if self._is_shown:
+            self._live.show_pen()
+            if self._live.worst_connection is not Connection.STREAMING:
+                self.clear()
             self._refresh()
 
     def set_value(self, value: PenMatch | None) -> None:
         """Show how the pen fits the views; None while unknown."""
         self._match = value
         self._refresh()
-
-    def doubt_of(self, match: PenMatch | None) -> str:
-        """Return the most serious finding of a match, a sentence; empty without one."""
-        if match is None or not match.findings:
-            return ""
-        return worded(match.findings[0].message)
 
     def reasons(self) -> dict[int, str]:
         """Return the findings on LEDs, by number."""
@@ -129,6 +282,7 @@ class MatchPanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         self.view.set_message(self.tr("No image yet"))
+        self._why_none = self._why_unknown()
         found = self._found()
         for i, remark in enumerate(self._messages):
             remark.set_value(found[i] if i < len(found) else StatusMessage())
@@ -199,3 +353,8 @@ class MatchPanel(Translated, QGroupBox):
 
 def _pixels(sigma: float) -> str:
     return number_text(sigma, 2 if sigma >= USUAL_SIGMA else 3)
+
+
+def _differ(swung: Pen, pen: Pen | None) -> bool:
+    """Return whether the LEDs of a file differ from the LEDs of the swing."""
+    return pen is None or not np.array_equal(swung.leds, pen.leds)

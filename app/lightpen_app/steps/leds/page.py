@@ -14,8 +14,7 @@ from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import set_tooltip
-from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
-from lightpen_app.steps.leds.match_control import MatchControl
+from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.widgets.controls import PushButton
@@ -64,16 +63,12 @@ class LedsPage(ResponsiveLayout, Page):
         self._shown_match: PenMatch | None = None
 
         # Widgets
-        self._file = LedFilePanel(can_discover=can_discover(services))
+        self._file = LedFilePanel(workbench, can_discover=can_discover(services))
         self._leds = LedTablePanel()
         self._space = FramePanel()
-        self._match = MatchPanel()
+        self._match = MatchPanel(workbench, self._file)
 
         self._pens = workbench.pens
-        self._files = LedFileControl(self._selection, workbench.pens, self._file)
-        self._matching = MatchControl(
-            self._files, self._selection, workbench.run, workbench.live, self._match
-        )
 
         # Layout
         self._content = ShrinkingScrollContent()
@@ -89,17 +84,14 @@ class LedsPage(ResponsiveLayout, Page):
 
         # Connections
         self._file.discovery_requested.connect(self.discovery_requested)
-        self._file.samples_requested.connect(workbench.files.use_samples)
-        self._files.status_changed.connect(workbench.notifications.show_status)
-        self._files.changed.connect(self._on_file_changed)
+        self._file.changed.connect(self._on_file_changed)
         self._leds.table.led_chosen.connect(self._space.view.set_chosen)
         self._space.view.led_chosen.connect(self._leds.table.set_chosen)
         self._space.correct.clicked.connect(self._on_correct_clicked)
-        self._matching.watch.value_changed.connect(self._on_match_changed)
+        self._match.watch.value_changed.connect(self._on_match_changed)
         self._pens.changed.connect(self.changed)
-        self._selection.changed.connect(self._on_selection_changed)
+        self._selection.changed.connect(self._show_pen)
 
-        self._on_selection_changed()
         self._on_file_changed()
 
     @override
@@ -119,7 +111,7 @@ class LedsPage(ResponsiveLayout, Page):
 
     @override
     def is_doubtful(self) -> bool:
-        return bool(self._pens.doubt() or self._matching.doubt())
+        return bool(self._pens.doubt() or self._match.doubt())
 
     @override
     def why_closed(self) -> str:
@@ -140,21 +132,19 @@ class LedsPage(ResponsiveLayout, Page):
 
     @override
     def entered(self) -> None:
-        self._matching.start()
-        self._files.reread()
+        self._match.start()
+        self._file.reread()
 
     @override
     def left(self) -> None:
-        self._matching.stop()
+        self._match.stop()
 
     @override
     def shut_down(self) -> None:
-        self._matching.watch.stop()
+        self._match.watch.stop()
 
     @override
     def _refresh(self) -> None:
-        self._files.retranslate()
-        self._matching.retranslate()
         self._on_file_changed()
 
     @override
@@ -167,14 +157,9 @@ class LedsPage(ResponsiveLayout, Page):
         else:
             self._panels.insertWidget(1, self._space, SHARES[1])
 
-    def _on_selection_changed(self) -> None:
-        source = self._selection.preparation.source
-        self._file.set_has_samples(source.kind == SourceKind.SIMULATED)
-        self._show_pen()
-
     def _on_file_changed(self) -> None:
         """Show the LEDs of the open file, and the correction that its frame needs."""
-        opened, note, verb = self._files.opened, StatusMessage(), ""
+        opened, note, verb = self._file.opened, StatusMessage(), ""
         self._correction = remark = None
         if opened is not None and opened.pen is not None:
             frame, pair = opened.frame, leds_to_exchange(opened.frame)
@@ -202,7 +187,7 @@ class LedsPage(ResponsiveLayout, Page):
 
     def _show_pen(self) -> None:
         """Show the pen of the open file and the nominal tip in use."""
-        opened, tip = self._files.opened, self._selection.preparation.nominal_tip
+        opened, tip = self._file.opened, self._selection.preparation.nominal_tip
         pen = None if opened is None else opened.pen
         self._leds.set_value(pen, tip)
         self._show_match()
@@ -219,14 +204,14 @@ class LedsPage(ResponsiveLayout, Page):
 
     def _on_correct_clicked(self) -> None:
         if self._correction is not None:
-            self._files.ask_place(self._correction)
+            self._file.ask_place(self._correction)
 
     def _doubt_question(self) -> tuple[str, str]:
         """Return the question whether to swing with LEDs that do not fit.
 
         The match says what does not fit.
         """
-        is_doubted = bool(self._matching.doubt())
+        is_doubted = bool(self._match.doubt())
         words = self.tr("The swing will probably fail.") if is_doubted else ""
         parts = self._pens.doubt(), words
         return " ".join(filter(None, parts)), self.tr("Swing anyway")

@@ -28,7 +28,7 @@ from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
-from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
+from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.table_panel import MISFIT, LedTable
@@ -334,10 +334,7 @@ def test_a_corrected_file_that_cannot_be_written_is_reported(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
-    control = seen.page.findChild(LedFileControl)
-    assert control is not None
-
-    control.save(paper_pen(), tmp_path / "no folder" / "leds.json")
+    seen.child(LedFilePanel).save(paper_pen(), tmp_path / "no folder" / "leds.json")
     seen.settle()
 
     assert "leds.json" in seen.words
@@ -588,7 +585,6 @@ def test_a_pen_that_is_away_is_not_found(
 def test_too_few_views_do_not_say_that_a_pen_fits(seen: "Seen") -> None:
     seen.page.entered()
     panel = seen.child(MatchPanel)
-    panel.set_why_unknown("")
 
     panel.set_value(PenMatch(2, 2, np.full(10, 0.05), findings=()))
 
