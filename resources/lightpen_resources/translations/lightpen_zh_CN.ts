@@ -1753,33 +1753,6 @@
     </message>
 </context>
 <context>
-    <name>LedFileControl</name>
-    <message>
-        <source>Save the corrected LEDs</source>
-        <translation>保存改正后的 LED</translation>
-    </message>
-    <message>
-        <source>{0} corrected</source>
-        <translation>{0} 已改正</translation>
-    </message>
-    <message>
-        <source>{0} Use it for this pen from now on?</source>
-        <translation>{0} 今后将其用于此光笔吗？</translation>
-    </message>
-    <message>
-        <source>Use this file</source>
-        <translation>使用此文件</translation>
-    </message>
-    <message>
-        <source>{0} remains open.</source>
-        <translation>{0} 仍处于打开状态。</translation>
-    </message>
-    <message>
-        <source>LEDs saved as {0} and in use.</source>
-        <translation>LED 已保存为 {0} 并使用。</translation>
-    </message>
-</context>
-<context>
     <name>LedFilePanel</name>
     <message>
         <source>Unit of the file</source>
@@ -1800,6 +1773,30 @@
     <message>
         <source>{0} does not state the unit of its coordinates. Choose it:</source>
         <translation>{0} 未注明坐标单位。请选择：</translation>
+    </message>
+    <message>
+        <source>Save the corrected LEDs</source>
+        <translation>保存改正后的 LED</translation>
+    </message>
+    <message>
+        <source>{0} corrected</source>
+        <translation>{0} 已改正</translation>
+    </message>
+    <message>
+        <source>LEDs saved as {0} and in use.</source>
+        <translation>LED 已保存为 {0} 并使用。</translation>
+    </message>
+    <message>
+        <source>{0} Use it for this pen from now on?</source>
+        <translation>{0} 今后将其用于此光笔吗？</translation>
+    </message>
+    <message>
+        <source>Use this file</source>
+        <translation>使用此文件</translation>
+    </message>
+    <message>
+        <source>{0} remains open.</source>
+        <translation>{0} 仍处于打开状态。</translation>
     </message>
     <message>
         <source>LED &amp;file</source>
@@ -2272,7 +2269,19 @@
     </message>
 </context>
 <context>
-    <name>MatchControl</name>
+    <name>MatchPanel</name>
+    <message>
+        <source>Live match</source>
+        <translation>实时匹配</translation>
+    </message>
+    <message>
+        <source>No match yet</source>
+        <translation>尚无匹配</translation>
+    </message>
+    <message>
+        <source>Wheel or + and - to zoom, arrow keys to move, 0 for the whole image.</source>
+        <translation>滚轮或 + 和 - 缩放，方向键移动，0 显示全图。</translation>
+    </message>
     <message>
         <source>No camera is open. See the step Camera.</source>
         <translation>没有打开相机。请看“相机”步骤。</translation>
@@ -2288,21 +2297,6 @@
     <message>
         <source>Open the LED file first.</source>
         <translation>请先打开 LED 文件。</translation>
-    </message>
-</context>
-<context>
-    <name>MatchPanel</name>
-    <message>
-        <source>Live match</source>
-        <translation>实时匹配</translation>
-    </message>
-    <message>
-        <source>No match yet</source>
-        <translation>尚无匹配</translation>
-    </message>
-    <message>
-        <source>Wheel or + and - to zoom, arrow keys to move, 0 for the whole image.</source>
-        <translation>滚轮或 + 和 - 缩放，方向键移动，0 显示全图。</translation>
     </message>
     <message>
         <source>No image yet</source>
