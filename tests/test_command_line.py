@@ -126,6 +126,7 @@ def test_ten_calibrations_scatter_no_more_than_by_their_noise(
     assert (np.std(tips, axis=0, ddof=1) <= 1.76 * np.median(noise, axis=0)).all()
 
 
+@pytest.mark.slow
 def test_ten_two_stage_calibrations_scatter_as_the_method_must(
     repeated: list[dict[str, Any]],
 ) -> None:

@@ -149,6 +149,7 @@ def test_a_calibration_gives_the_same_tip_in_unusual_locales(
     not (shutil.which("localedef") and SOURCE.exists()),
     reason="needs localedef and the source of a Turkish locale (Debian: locales)",
 )
+@pytest.mark.slow
 @pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="PySide6 6.12 mends it")
 def test_the_turkish_locale_of_these_tests_has_what_made_the_window_fail(
     environment_of: EnvironmentOf,

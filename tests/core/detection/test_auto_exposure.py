@@ -58,8 +58,9 @@ class Loop:
         pytest.fail(f"There was no outcome: {now}.")
 
 
-@pytest.mark.parametrize("exposure_us", [150.0, 1000.0, 4000.0, 40_000.0])
-@pytest.mark.parametrize("bits", [8, 12])
+@pytest.mark.parametrize(
+    ("exposure_us", "bits"), [(150.0, 8), (1000.0, 12), (4000.0, 8), (40_000.0, 8)]
+)
 def test_the_brightest_led_comes_to_80_percent_and_none_is_saturated(
     exposure_us: float, bits: Literal[8, 12]
 ) -> None:

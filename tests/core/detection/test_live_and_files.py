@@ -225,11 +225,11 @@ def assert_alike(live: PenDetection, files: Observations, index: int) -> None:
 
 
 def usual_and_slow() -> Iterator[Any]:
-    """Return the names of the scenes; those of a reason beyond three are slow."""
+    """Return the names of the scenes; those of a reason beyond two are slow."""
     seen: Counter[Reason] = Counter()
     for name, (_, reason) in SCENES.items():
         seen[reason] += 1
-        yield pytest.param(name, marks=[pytest.mark.slow] if seen[reason] > 3 else [])
+        yield pytest.param(name, marks=[pytest.mark.slow] if seen[reason] > 2 else [])
 
 
 @pytest.mark.parametrize("name", [*usual_and_slow()])

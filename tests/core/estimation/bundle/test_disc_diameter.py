@@ -134,7 +134,7 @@ def test_the_uncertainty_of_the_diameter_is_made_of_edge_scatter_and_dome() -> N
     assert reading.shift == pytest.approx(shift)
 
 
-@pytest.mark.parametrize("said", [9.0, 11.0, 13.0])
+@pytest.mark.parametrize("said", [pytest.param(9.0, marks=pytest.mark.slow), 13.0])
 def test_a_wrong_diameter_is_put_right_and_named(said: float) -> None:
     result = calibrated(said, true_areas())
 

@@ -113,6 +113,7 @@ def test_led_errors_within_what_the_file_states_are_no_finding() -> None:
     assert all(share(result, ContributionName.LEDS).any() for result in results)
 
 
+@pytest.mark.slow
 def test_led_errors_that_hide_in_the_noise_count_all_the_same() -> None:
     center = PEN.leds.mean(axis=0)
     variances = []
@@ -255,6 +256,7 @@ def test_jitter_of_the_seat_is_found_with_its_size_and_its_share() -> None:
     assert (np.sqrt(noise / counted_twice) < 0.5).all()
 
 
+@pytest.mark.slow
 def test_jitter_of_the_seat_in_few_images_is_taken_for_nothing_else() -> None:
     swing = swing_poses(15, np.random.default_rng(5))
     pen = replace(PEN, led_sigma=0.002)
