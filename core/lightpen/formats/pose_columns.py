@@ -281,7 +281,10 @@ def without_names(values: FloatArray, name: str) -> tuple[FloatArray, FloatArray
     good = [each for each in candidates if are_rotations(each[0])]
     if not good:
         raise FileError("poses.no-header", name=name, n_columns=values.shape[1])
-    return min(good, key=lambda each: scatter(*each))
+    counts = [int(np.isfinite(R).all(axis=(1, 2)).sum()) for R, _ in good]
+    # A few rows of places and quaternions may by chance be rotations in another order.
+    likely = [g for g, n in zip(good, counts, strict=True) if n > max(counts) / 2]
+    return min(likely, key=lambda each: scatter(*each))
 
 
 def are_rotations(matrices: FloatArray) -> bool:

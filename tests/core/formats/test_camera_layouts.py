@@ -238,6 +238,9 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(ANIPOSE, id="anipose"),
         pytest.param(MRCAL, id="mrcal"),
         pytest.param(MRCAL.split("\n", 1)[1], id="mrcal without comment"),
+        pytest.param(
+            MRCAL.replace("mk;8K", "mk;M1=K"), id="mrcal by chance like a pair"
+        ),
         pytest.param(MRCAL.replace("0., 0., 0., 0.,]", "]"), id="mrcal OPENCV4"),
         pytest.param(COLMAP, id="COLMAP"),
         pytest.param(COLMAP.replace("# ", ""), id="COLMAP without marks of comments"),
@@ -502,6 +505,8 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         (json.dumps(calib_io(tauX=0.1)), "thin prism or a tilted sensor"),
         ("p = cameraParameters('K', [1 0 0], 'ImageSize', [9 9]);", "MATLAB"),
         ({"CameraParameters1": {}, "CameraParameters2": {}}, "a stereo pair"),
+        (f"<o><M1 type_id='opencv-matrix'>{MATRIX}</M1></o>", "a stereo pair"),
+        ("Camera: {fx: 435}\nStereoRectifier:\n  model: fisheye\n", "a stereo pair"),
         ("calib_time: 09-Jan-2012\nK_00: 984 0 690 0 980 233 0 0 1\n", "KITTI"),
         ("%YAML:1.0\nnames:\n  - '1'\nK_1: !!opencv-matrix\n", "EasyMocap"),
         ("[ImageReader]\ncamera_model=OPENCV\ncamera_params=1,1,0\n", "COLMAP"),

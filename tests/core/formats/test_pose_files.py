@@ -94,6 +94,24 @@ def test_poses_of_other_programs_are_read_in_their_conventions(
     assert found.n_lost == 0
 
 
+def test_few_rows_that_fit_another_order_by_chance_do_not_decide(
+    tmp_path: Path,
+) -> None:
+    rng = np.random.default_rng(2)
+    quaternions = Rotation.random(60, random_state=3).as_quat()
+    places = rng.normal(0, 3.0, (60, 3))
+    places[:5] *= np.sqrt(1 - quaternions[:5, :1] ** 2) / np.linalg.norm(
+        places[:5], axis=1, keepdims=True
+    )  # with the first number of the quaternion of length 1
+    path = tmp_path / "tum.txt"
+    np.savetxt(path, np.column_stack([np.arange(60), places, quaternions]))
+
+    found = read_poses(path)
+
+    assert found.n_lost == 0
+    np.testing.assert_allclose(found.translations, 1000 * places)
+
+
 @pytest.mark.parametrize(
     ("unit", "size"), [("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)]
 )
