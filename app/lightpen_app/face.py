@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # they take long to be imported
     from lightpen.swing.status import SwingStatus
     from lightpen_app.work.chosen_files import SavePlace
 
+T = TypeVar("T")
 W = TypeVar("W", bound=QWidget)
 
 
@@ -311,46 +312,19 @@ class WindowService(Service, Generic[W]):
 Services: TypeAlias = Sequence[Service]
 
 
+def first_of(services: Services, part: Callable[[Service], T]) -> T | None:
+    """Return what the first extension that has it gives for a part."""
+    return next(filter(None, map(part, services)), None)
+
+
 def verify_step(services: Services) -> str:
     """Return the key of the page where a tip is verified; empty for none."""
-    return next(filter(None, (each.verify_step for each in services)), "")
-
-
-def event_text(services: Services, event: "Event") -> str:
-    """Return the kind of an entry of an extension; empty for an entry of main."""
-    return next(filter(None, (each.event_text(event) for each in services)), "")
-
-
-def export_formats(services: Services) -> "tuple[ExportFormat, ...]":
-    """Return the formats that extensions add to those of main."""
-    return tuple(form for each in services for form in each.export_formats())
+    return first_of(services, lambda each: each.verify_step) or ""
 
 
 def report_printer(
     services: Services, place: "SavePlace", page: QWidget
 ) -> ReportPrinter:
     """Return what shows reports for a page."""
-    printers = (each.report_printer(place, page) for each in services)
-    return next(filter(None, printers), None) or ReportPrinter(page)
-
-
-def swing_controls(services: Services, live: LiveView) -> SimulatorControls:
-    """Return the controls of the simulated operator."""
-    found = (each.swing_controls() for each in services)
-    return next(filter(None, found), None) or SimulatorControls(live)
-
-
-def press_comparison(services: Services) -> PressComparison:
-    """Return what compares a press test."""
-    found = (each.press_comparison() for each in services)
-    return next(filter(None, found), None) or PressComparison()
-
-
-def can_discover(services: Services) -> bool:
-    """Return whether pen and camera can be found without files."""
-    return any(each.discovers for each in services)
-
-
-def can_calibrate(services: Services) -> bool:
-    """Return whether a camera can be calibrated."""
-    return any(each.calibrates_cameras for each in services)
+    found = first_of(services, lambda each: each.report_printer(place, page))
+    return found or ReportPrinter(page)

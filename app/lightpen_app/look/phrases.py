@@ -161,6 +161,49 @@ _GRADES: dict[Grade, str] = {
     Grade.CHECK: QT_TRANSLATE_NOOP("phrases", "CHECK"),
     Grade.REPEAT: QT_TRANSLATE_NOOP("phrases", "REPEAT"),
 }
+# Of contributions to U: in a word or two, and whole.
+_SHARES: dict[ContributionName, tuple[str, str]] = {
+    ContributionName.NOISE: (
+        QT_TRANSLATE_NOOP("phrases", "noise"),
+        QT_TRANSLATE_NOOP("phrases", "Image noise"),
+    ),
+    ContributionName.FORM: (
+        QT_TRANSLATE_NOOP("phrases", "form of ball, cone"),
+        QT_TRANSLATE_NOOP("phrases", "Form error of ball and cone"),
+    ),
+    ContributionName.SEAT: (
+        QT_TRANSLATE_NOOP("phrases", "seating"),
+        QT_TRANSLATE_NOOP("phrases", "Seating of the tip in the cone"),
+    ),
+    ContributionName.DRIFT: (
+        QT_TRANSLATE_NOOP("phrases", "drift"),
+        QT_TRANSLATE_NOOP("phrases", "Drift of cone and camera"),
+    ),
+    ContributionName.LEDS: (
+        QT_TRANSLATE_NOOP("phrases", "LEDs"),
+        QT_TRANSLATE_NOOP("phrases", "LED positions of the LED file"),
+    ),
+    ContributionName.DIAMETER: (
+        QT_TRANSLATE_NOOP("phrases", "disc diameter"),
+        QT_TRANSLATE_NOOP("phrases", "Diameter of the LED discs"),
+    ),
+    ContributionName.CAMERA: (
+        QT_TRANSLATE_NOOP("phrases", "camera"),
+        QT_TRANSLATE_NOOP("phrases", "Intrinsics of the camera"),
+    ),
+    ContributionName.EXTRINSICS: (
+        QT_TRANSLATE_NOOP("phrases", "rig"),
+        QT_TRANSLATE_NOOP("phrases", "Extrinsics of the cameras"),
+    ),
+    ContributionName.METHOD: (
+        QT_TRANSLATE_NOOP("phrases", "two-stage method"),
+        QT_TRANSLATE_NOOP("phrases", "Two-stage method, difference from the joint fit"),
+    ),
+    ContributionName.LENS: (
+        QT_TRANSLATE_NOOP("phrases", "lens"),
+        QT_TRANSLATE_NOOP("phrases", "Lens and LED centres"),
+    ),
+}
 # What to do for a posture in each direction; as `_SIDES`.
 _LEANS = (
     QT_TRANSLATE_NOOP("phrases", "Tilt right"),
@@ -253,51 +296,7 @@ def reason_text(reason: Reason) -> str:
 
 def share_text(name: ContributionName, *, is_whole: bool = False) -> str:
     """Return a contribution to U in a word or two, as in plots, or as a whole."""
-    return _translated(_share_texts(name)[is_whole])
-
-
-def _share_texts(name: ContributionName) -> tuple[str, str]:
-    match name:
-        case ContributionName.NOISE:
-            return QT_TRANSLATE_NOOP("phrases", "noise"), QT_TRANSLATE_NOOP(
-                "phrases", "Image noise"
-            )
-        case ContributionName.FORM:
-            return QT_TRANSLATE_NOOP(
-                "phrases", "form of ball, cone"
-            ), QT_TRANSLATE_NOOP("phrases", "Form error of ball and cone")
-        case ContributionName.SEAT:
-            return QT_TRANSLATE_NOOP("phrases", "seating"), QT_TRANSLATE_NOOP(
-                "phrases", "Seating of the tip in the cone"
-            )
-        case ContributionName.DRIFT:
-            return QT_TRANSLATE_NOOP("phrases", "drift"), QT_TRANSLATE_NOOP(
-                "phrases", "Drift of cone and camera"
-            )
-        case ContributionName.LEDS:
-            return QT_TRANSLATE_NOOP("phrases", "LEDs"), QT_TRANSLATE_NOOP(
-                "phrases", "LED positions of the LED file"
-            )
-        case ContributionName.DIAMETER:
-            return QT_TRANSLATE_NOOP("phrases", "disc diameter"), QT_TRANSLATE_NOOP(
-                "phrases", "Diameter of the LED discs"
-            )
-        case ContributionName.CAMERA:
-            return QT_TRANSLATE_NOOP("phrases", "camera"), QT_TRANSLATE_NOOP(
-                "phrases", "Intrinsics of the camera"
-            )
-        case ContributionName.EXTRINSICS:
-            return QT_TRANSLATE_NOOP("phrases", "rig"), QT_TRANSLATE_NOOP(
-                "phrases", "Extrinsics of the cameras"
-            )
-        case ContributionName.METHOD:
-            return QT_TRANSLATE_NOOP("phrases", "two-stage method"), QT_TRANSLATE_NOOP(
-                "phrases", "Two-stage method, difference from the joint fit"
-            )
-        case ContributionName.LENS:
-            return QT_TRANSLATE_NOOP("phrases", "lens"), QT_TRANSLATE_NOOP(
-                "phrases", "Lens and LED centres"
-            )
+    return _translated(_SHARES[name][is_whole])
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:

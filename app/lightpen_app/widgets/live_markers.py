@@ -1,5 +1,6 @@
 """Rings for the spots of a live image."""
 
+from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -7,6 +8,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QWidget
 
 from lightpen.arrays import BoolArray, FloatArray
+from lightpen.cameras.protocol import Frame
 from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import Tone
@@ -70,6 +72,34 @@ def led_numbers(seen: LiveImage) -> dict[int, str]:
     return {
         int(spot_of_led[led]): str(led + 1) for led in np.flatnonzero(labelled).tolist()
     }
+
+
+RATE_S = 2.0  # over which the images are counted
+
+
+class FrameRate:
+    """Measures how many images come."""
+
+    def __init__(self) -> None:
+        self._arrivals: deque[tuple[float, int]] = deque()  # time, number of the image
+
+    def add(self, frame: Frame) -> None:
+        """Count one more image; one of another stream begins anew."""
+        time = frame.host_ts_ns * 1e-9
+        if self._arrivals:
+            before, number = self._arrivals[-1]
+            if not 0 < time - before < RATE_S or frame.seq <= number:
+                self._arrivals.clear()
+        self._arrivals.append((time, frame.seq))
+        while time - self._arrivals[0][0] > RATE_S:
+            self._arrivals.popleft()
+
+    def value(self) -> float:
+        """Return the images a second; 0 before the second image."""
+        if len(self._arrivals) < 2:
+            return 0.0
+        (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
+        return (last - first) / (end - start)
 
 
 N_CAMERAS = 2

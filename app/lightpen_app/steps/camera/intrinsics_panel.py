@@ -22,7 +22,7 @@ from lightpen.formats.rig_files import write_window
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera, unmodelled_effects_of
 from lightpen.record.swings.solving import Solution
-from lightpen_app.face import Services, can_calibrate, can_discover
+from lightpen_app.face import Services
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
@@ -72,8 +72,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self.discovery_requested,
             tip=self.tr("Find pen, camera and tip by one swing and one length."),
         )
-        self._calibrate.setVisible(can_calibrate(services))
-        self._discover.setVisible(can_discover(services))
+        self._calibrate.setVisible(any(each.calibrates_cameras for each in services))
+        self._discover.setVisible(any(each.discovers for each in services))
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()

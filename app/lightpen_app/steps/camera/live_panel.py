@@ -18,12 +18,17 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.image_view import ImageView, Marker
-from lightpen_app.widgets.live_markers import CameraSwitch, led_numbers, live_markers
+from lightpen_app.widgets.live_markers import (
+    CameraSwitch,
+    FrameRate,
+    led_numbers,
+    live_markers,
+)
 from lightpen_app.widgets.state_banner import SignLabel, StatusMessage, origin_message
 from lightpen_app.work.live_view import DisplayedImage
 
 HEAD_GAP = 3 * GRID  # px, between the words above the image
-N_TIMED = 40  # images for the mean rate: two seconds
+N_COUNTED = 40  # images of which the lost ones are counted
 WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
 
@@ -38,9 +43,9 @@ class LivePanel(Translated, QWidget):
         self._sentence = ""
         self._recorded: Origin | None = None
         self._shown = 0  # of the cameras
-        self._arrivals: deque[tuple[int, int]] = deque(maxlen=N_TIMED)  # ns, number
+        self._rate = FrameRate()
         self._seen: LiveImage | None = None
-        self._n_lost: deque[int] = deque(maxlen=N_TIMED)
+        self._n_lost: deque[int] = deque(maxlen=N_COUNTED)
         self._extra: tuple[Marker, ...] = ()
 
         # Widgets
@@ -76,10 +81,7 @@ class LivePanel(Translated, QWidget):
     def set_image(self, shown: DisplayedImage, stats: Stats) -> None:
         """Show another image and the frame counters."""
         self._seen = shown.seen
-        frame = shown.seen.frame
-        if self._arrivals and frame.seq <= self._arrivals[-1][1]:
-            self._arrivals.clear()  # of another stream
-        self._arrivals.append((frame.host_ts_ns, frame.seq))
+        self._rate.add(shown.seen.frame)
         self._n_lost.append(stats.missed + stats.incomplete)
         rings = live_markers(shown.seen)
         free = (ring for ring in rings if not self._is_found(ring))
@@ -108,7 +110,7 @@ class LivePanel(Translated, QWidget):
         """Clear the image until the next arrives."""
         self.view.clear()
         self._seen = None
-        self._arrivals.clear()
+        self._rate = FrameRate()
         self._n_lost.clear()
         self._figures.clear()
 
@@ -157,7 +159,7 @@ class LivePanel(Translated, QWidget):
         height, width = seen.frame.image.shape
         parts = [
             self._leds_text(seen),
-            self.tr("{0} fps").format(f"{self._rate():.0f}"),
+            self.tr("{0} fps").format(f"{self._rate.value():.0f}"),
         ]
         n_lost = self._n_lost[-1] - self._n_lost[0]
         if n_lost > 0:
@@ -184,9 +186,3 @@ class LivePanel(Translated, QWidget):
             hypot(ring.x - mark.x, ring.y - mark.y) < mark.radius
             for mark in self._extra
         )
-
-    def _rate(self) -> float:
-        """Return the frame rate, 1/s."""
-        (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
-        seconds = (end - start) * 1e-9
-        return (last - first) / seconds if seconds > 0 else 0.0

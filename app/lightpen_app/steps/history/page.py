@@ -9,11 +9,11 @@ from typing import TypeVar
 from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
-from lightpen.archive.chains import StoredEntry
+from lightpen.archive.chains import Event, StoredEntry
 from lightpen.archive.history import EntryFilter, Line, lines
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.trends import Trend, trend_of
-from lightpen_app.face import Services, event_text, report_printer
+from lightpen_app.face import Services, first_of, report_printer
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.history.archive_panel import ArchivePanel, DuePanel
@@ -44,7 +44,11 @@ class HistoryPage(Page):
 
     def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
-        kind_of = partial(event_text, services)
+
+        def kind_of(event: Event) -> str:
+            """Return the kind of an entry of an extension; empty for one of main."""
+            return first_of(services, lambda each: each.event_text(event)) or ""
+
         self._run = workbench.run
         self._settings = workbench.settings
         self._notices = workbench.notifications

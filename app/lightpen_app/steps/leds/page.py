@@ -7,7 +7,7 @@ from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import exchanged, leds_to_exchange
 from lightpen.pen_check.match import PenMatch
 from lightpen.swing.preparation import SourceKind
-from lightpen_app.face import Services, can_discover
+from lightpen_app.face import Services
 from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
@@ -63,7 +63,9 @@ class LedsPage(ResponsiveLayout, Page):
         self._shown_match: PenMatch | None = None
 
         # Widgets
-        self._file = LedFilePanel(workbench, can_discover=can_discover(services))
+        self._file = LedFilePanel(
+            workbench, can_discover=any(each.discovers for each in services)
+        )
         self._leds = LedTablePanel()
         self._space = FramePanel()
         self._match = MatchPanel(workbench, self._file)

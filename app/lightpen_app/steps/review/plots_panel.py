@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QFrame, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray
@@ -28,9 +28,8 @@ from lightpen_app.look.layouts import (
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import AXES, PARTED, mm_text, set_tooltip
-from lightpen_app.steps.review.plot_cards import PlotCard
 from lightpen_app.widgets.fields import Translated
-from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.live_markers import CameraSwitch
 from lightpen_app.widgets.result_plots import (
     ArrowPlot,
@@ -44,21 +43,28 @@ N_COLUMNS = 2  # of plots
 LEAST_HEIGHT = 25 * GRID  # px, of a plot with its title and axes
 
 
+def framed(plot: Figure) -> QFrame:
+    """Return a frame with a plot."""
+    frame = QFrame()
+    frame.setProperty("area", "panel")
+    vertical_layout(frame, plot, margins=GRID // 2)
+    return frame
+
+
 class PlotsPanel(Translated, QWidget):
     """Base of the panels: shows plots of a solution."""
 
-    def __init__(self, cards: Sequence[PlotCard]) -> None:
+    def __init__(self, plots: Sequence[Figure]) -> None:
         super().__init__()
         self._solution: Solution | None = None
         self._limit: float | None = None  # of U, mm
-
-        self._cards = tuple(cards)
+        self._cards = tuple(map(framed, plots))
 
         # Layout
         self._layout = vertical_layout(self, margins=(0, GRID, 0, 0))
         grid = grid_layout(self._layout, stretch=1)
-        for i, card in enumerate(self._cards):
-            card.plot.setMinimumHeight(LEAST_HEIGHT)
+        for i, (plot, card) in enumerate(zip(plots, self._cards, strict=True)):
+            plot.setMinimumHeight(LEAST_HEIGHT)
             grid.addWidget(card, *divmod(i, N_COLUMNS))
 
     def value(self) -> Solution | None:
@@ -73,10 +79,6 @@ class PlotsPanel(Translated, QWidget):
 
     def set_failed(self, failed: FailedSwing, rig: Rig) -> None:
         """Show images that gave no tip; only their residuals are known."""
-
-    def cards(self) -> Sequence[PlotCard]:
-        """Return the plots with their menus."""
-        return self._cards
 
     def shut_down(self) -> None:
         """Cancel running jobs."""
@@ -93,10 +95,8 @@ class ResidualsPanel(PlotsPanel):
         self._arrows, self._lens = ArrowPlot(Axes("")), ArrowPlot(Axes(""))
         axes = Axes(self.tr("Residuals by LED / px"), self.tr("LED"))
         self._leds = BarPlot(axes, ("", "", ""))
-        super().__init__(
-            [PlotCard(self._arrows), PlotCard(self._leds), PlotCard(self._lens)]
-        )
-        self._lens_card = self.cards()[-1]
+        super().__init__((self._arrows, self._leds, self._lens))
+        self._lens_card = self._cards[-1]
         self._lens_card.setVisible(False)
         self._advice = self.say(
             text_label(TextSize.SMALL, Tone.QUIET),
@@ -201,7 +201,7 @@ class UncertaintyPanel(PlotsPanel):
             self.tr("away from the camera"),
         )
         self._postures = PosturePlot(axes)
-        super().__init__([PlotCard(self._budget), PlotCard(self._postures)])
+        super().__init__((self._budget, self._postures))
         self._remark = text_label(TextSize.SMALL, Tone.QUIET)
         rows = (each.budget_row() for each in services)
         self._checks = [row for row in rows if row is not None]

@@ -19,7 +19,7 @@ from lightpen.record.exports import (
     exported_solution,
     save_new,
 )
-from lightpen_app.face import Services, export_formats, report_printer
+from lightpen_app.face import Services, report_printer
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.words import set_tooltip
@@ -47,7 +47,8 @@ class ResultTools(Translated, QWidget):
         self._run, self._place, self._services = run, place, services
         self._saving: Job | None = None
         self._print_report = report_printer(services, place, self)
-        single = [(each,) for each in (*TABLE_FORMATS, *export_formats(services))]
+        others_too = (form for each in services for form in each.export_formats())
+        single = [(each,) for each in (*TABLE_FORMATS, *others_too)]
 
         # Widgets
         self._copy = self.make_button(self.tr("Copy tip"), self._copy_tip)

@@ -1,10 +1,12 @@
 """Form for an item of the tip library."""
 
 from datetime import date
+from typing import Any
 
 from msgspec import structs
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
+from typing_extensions import override
 
 from lightpen.local_time import local_now
 from lightpen.model.artefacts import KIND_WORDS, SIDES, ArtefactKind, Side
@@ -29,7 +31,10 @@ LONGEST_NOTE = 500  # characters
 
 
 class ItemForm(Translated, QWidget):
-    """Shows an item; the id of one that is known cannot be changed."""
+    """Shows an item; the id of one that is known cannot be changed.
+
+    Fields are named as those of the item.
+    """
 
     value_edited = Signal()  # something is typed
 
@@ -38,163 +43,141 @@ class ItemForm(Translated, QWidget):
         self._item: AnyItem = ListedTip(id="?")
 
         # Widgets
-        self._id = QLineEdit(maxLength=LONGEST_ID)
-        to_come = date(local_now().year + 1, 8, 14)
-        self._due, self._certified = DateField(to_come), DateField()
-        self._certificate = QLineEdit(maxLength=LONGEST_ID)
-        self._value = NumberField("mm", (0.0, LARGEST_REFERENCE), 4)
-        self._shape, self._side = ChoiceField(), ChoiceField()
-        for shape in (None, *ArtefactKind):
-            self._shape.addItem("", shape)
-        for side in SIDES:
-            self._side.addItem("", side)
-        self._uncertainty = NumberField("mm", (0.0, 1.0), 4)
-        self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
-        self._change = self.say(
-            NumberField("mm", (0.0, LARGEST_CHANGE), 4),
-            tip=self.tr(
-                "Max. distance of the tip from its previous calibration. Beyond it, "
-                "the result needs checking."
-            ),
-        )
-        self._days = NumberField("", (0, MOST_DAYS), 0)
-        self._nominal = PointField()
-        self._note = QLineEdit(maxLength=LONGEST_NOTE)
-        own = (self._ball, self._change, self._days)
-        of_reference = self._value, self._shape, self._uncertainty, self._side
-        nothing, no_limit = self.tr("Not specified"), self.tr("No limit")
-        usual = self.tr("As for the station")
-        texts = (
-            (self._id, self.tr("ID (as on label)"), ""),
-            (self._due, self.tr("Expiry date"), ""),
-            (self._certificate, self.tr("Certificate number"), ""),
-            (self._certified, self.tr("Date of the certificate"), ""),
-            (self._value, self.tr("Certified value"), nothing),
-            (self._shape, self.tr("Shape"), ""),
-            (self._uncertainty, self.tr("U (k = 2) of the value"), nothing),
-            (self._side, self.tr("Contact"), ""),
-            (self._ball, self.tr("Ball diameter"), nothing),
-            (self._change, self.tr("Max. change since last calibration"), no_limit),
-            (self._days, self.tr("Calibration interval (days)"), usual),
-            (self._nominal, self.tr("Nominal tip centre"), ""),
-            (self._note, self.tr("Comment"), ""),
-        )
-        self._labels: dict[QWidget, QLabel] = {
-            field: self.make_label(field, text, hint=hint)
-            for field, text, hint in texts
+        self._words = {
+            "id": QLineEdit(maxLength=LONGEST_ID),
+            "certificate": QLineEdit(maxLength=LONGEST_ID),
+            "note": QLineEdit(maxLength=LONGEST_NOTE),
         }
-        for field in own:
-            self._labels[field].setWordWrap(True)
+        to_come = date(local_now().year + 1, 8, 14)
+        self._days = {"due": DateField(to_come), "certified": DateField()}
+        self._numbers = {
+            "certified_mm": NumberField("mm", (0.0, LARGEST_REFERENCE), 4),
+            "uncertainty_mm": NumberField("mm", (0.0, 1.0), 4),
+            "ball_diameter_mm": NumberField("mm", (0.0, LARGEST_BALL), 4),
+            "max_change_mm": NumberField("mm", (0.0, LARGEST_CHANGE), 4),
+            "max_days": NumberField("", (0, MOST_DAYS), 0),
+        }
+        self._choices = {"shape": ChoiceField(), "side": ChoiceField()}
+        for choice, values in (("shape", (None, *ArtefactKind)), ("side", SIDES)):
+            for each in values:
+                self._choices[choice].addItem("", each)
+        self._nominal = PointField()
+        self._tip_only, self._reference_only = QWidget(), QWidget()
+        change = self.tr(
+            "Max. distance of the tip from its previous calibration. Beyond it, "
+            "the result needs checking."
+        )
+        self.say(self._numbers["max_change_mm"], tip=change)
         last_day = self.tr("Last day of use, for example {0}; empty for none")
-        self.say(self._due, tip=last_day.format(to_come))
+        self.say(self._days["due"], tip=last_day.format(to_come))
 
         # Layout
-        grid = grid_layout(self, spacing=(2 * GRID, GRID // 2))
-        self._add(grid, self._id, at=(0, 0))
-        self._add(grid, self._due, at=(0, 1))
-        self._add(grid, self._note, at=(0, 2, 1, 2))
-        self._tip_only = QWidget()
-        self._add(grid, self._certificate, at=(1, 0))
-        self._add(grid, self._certified, at=(1, 1))
-        self._reference_only = QWidget()
-        row = grid_layout(self._reference_only, spacing=(2 * GRID, GRID // 2))
-        for column, of_it in enumerate(of_reference):
-            self._add(row, of_it, at=(0, column))
-        grid.addWidget(self._reference_only, 3, 0, 1, 4)
+        spacing = 2 * GRID, GRID // 2
+        grid = grid_layout(self, spacing=spacing)
+        of_tip = grid_layout(self._tip_only, spacing=spacing)
+        of_reference = grid_layout(self._reference_only, spacing=spacing)
         grid.addWidget(self._tip_only, 2, 0, 1, 4)
-        inner = grid_layout(self._tip_only, spacing=(2 * GRID, GRID // 2))
-        for column, field in enumerate(own):
-            self._add(inner, field, at=(0, column))
-        self._add(inner, self._nominal, at=(1, 0, 1, 4))
-        for layout in (grid, inner):
+        grid.addWidget(self._reference_only, 3, 0, 1, 4)
+        nothing, no_limit = self.tr("Not specified"), self.tr("No limit")
+        usual = self.tr("As for the station")
+        texts = {
+            "id": (self.tr("ID (as on label)"), ""),
+            "due": (self.tr("Expiry date"), ""),
+            "note": (self.tr("Comment"), ""),
+            "certificate": (self.tr("Certificate number"), ""),
+            "certified": (self.tr("Date of the certificate"), ""),
+            "certified_mm": (self.tr("Certified value"), nothing),
+            "shape": (self.tr("Shape"), ""),
+            "uncertainty_mm": (self.tr("U (k = 2) of the value"), nothing),
+            "side": (self.tr("Contact"), ""),
+            "ball_diameter_mm": (self.tr("Ball diameter"), nothing),
+            "max_change_mm": (self.tr("Max. change since last calibration"), no_limit),
+            "max_days": (self.tr("Calibration interval (days)"), usual),
+        }
+        fields = {**self._words, **self._days, **self._numbers, **self._choices}
+        of_all: tuple[GridPlace, ...] = (0, 0), (0, 1), (0, 2, 1, 2), (1, 0), (1, 1)
+        places = [(grid, at) for at in of_all]
+        places += [(of_reference, (0, column)) for column in range(4)]
+        places += [(of_tip, (0, column)) for column in range(3)]
+        for (name, (text, hint)), (layout, at) in zip(
+            texts.items(), places, strict=True
+        ):
+            label = self.make_label(fields[name], text, hint=hint)
+            label.setWordWrap(layout is of_tip)
+            add_labelled(layout, label, fields[name], at=at)
+        nominal = self.tr("Nominal tip centre")
+        self.make_field(of_tip, self._nominal, nominal, at=(1, 0, 1, 4))
+        for layout in (grid, of_tip):
             for column in range(4):
                 layout.setColumnStretch(column, 1)
 
         # Connections
-        self._id.textChanged.connect(self.value_edited)
-        for day in (self._due, self._certified):
-            day.textChanged.connect(self.value_edited)
+        for edit in (self._words["id"], *self._days.values()):
+            edit.textChanged.connect(self.value_edited)
 
         self._refresh()
 
     def value(self) -> AnyItem:
         """Return the item in the form."""
-        for field in (self._ball, self._change, self._days):
+        for field in self._numbers.values():
             field.settle()
         self._nominal.settle()
-        item = structs.replace(
-            self._item,
-            id=self._id.text().strip(),
-            due=self._due.value(),
-            certificate=self._certificate.text().strip(),
-            certified=self._certified.value(),
-            note=self._note.text().strip(),
-        )
-        if isinstance(item, ListedReference):
-            self._value.settle()
-            self._uncertainty.settle()
-            shape, side = self._shape.currentData(), self._side.currentData()
-            return structs.replace(
-                item,
-                certified_mm=self._value.value() or None,
-                shape=None if shape is None else ArtefactKind(shape),
-                uncertainty_mm=self._uncertainty.value(),
-                side=Side(side),
-            )
-        if not isinstance(item, ListedTip):
-            return item
-        nominal = self._nominal.value()
+        nominal, shape = self._nominal.value(), self._choices["shape"].currentData()
+        typed: dict[str, Any] = {
+            **{name: edit.text().strip() for name, edit in self._words.items()},
+            **{name: day.value() for name, day in self._days.items()},
+            **{name: field.value() or None for name, field in self._numbers.items()},
+            "uncertainty_mm": self._numbers["uncertainty_mm"].value(),
+            "max_days": round(self._numbers["max_days"].value()) or None,
+            "shape": None if shape is None else ArtefactKind(shape),
+            "side": Side(self._choices["side"].currentData()),
+            "nominal_tip_mm": None if nominal is None else tuple(nominal.tolist()),
+        }
+        own = type(self._item).__struct_fields__
         return structs.replace(
-            item,
-            ball_diameter_mm=self._ball.value() or None,
-            max_change_mm=self._change.value() or None,
-            max_days=round(self._days.value()) or None,
-            nominal_tip_mm=None if nominal is None else tuple(nominal.tolist()),
+            self._item, **{name: typed[name] for name in own if name in typed}
         )
 
     def set_value(self, item: AnyItem, *, is_new: bool) -> None:
         """Show an item."""
         self._item = item
-        self._id.setText(item.id)
-        self._id.setReadOnly(not is_new)
-        self._due.set_value(item.due)
-        self._certificate.setText(item.certificate)
-        self._certified.set_value(item.certified)
+        self._words["id"].setReadOnly(not is_new)
+        self._tip_only.setVisible(isinstance(item, ListedTip))
         self._reference_only.setVisible(isinstance(item, ListedReference))
-        if isinstance(item, ListedReference):
-            self._value.set_value(item.certified_mm or 0.0)
-            self._shape.setCurrentIndex(self._shape.findData(item.shape))
-            self._uncertainty.set_value(item.uncertainty_mm)
-            self._side.setCurrentIndex(self._side.findData(item.side))
-        self._note.setText(item.note)
-        is_tip = isinstance(item, ListedTip)
-        self._tip_only.setVisible(is_tip)
+        known = structs.asdict(item)
+        for name, edit in self._words.items():
+            edit.setText(known[name])
+        for name, day in self._days.items():
+            day.set_value(known[name])
+        for name, field in self._numbers.items():
+            field.set_value(known.get(name) or 0.0)
+        for name, choice in self._choices.items():
+            if name in known:
+                choice.setCurrentIndex(choice.findData(known[name]))
         if isinstance(item, ListedTip):
-            self._ball.set_value(item.ball_diameter_mm or 0.0)
-            self._change.set_value(item.max_change_mm or 0.0)
-            self._days.set_value(item.max_days or 0)
             self._nominal.set_value(item.nominal_tip)
-        self._refresh()
 
     def focus_first(self) -> None:
         """Put the keyboard into the first field that can be changed."""
-        (self._due if self._id.isReadOnly() else self._id).setFocus()
+        name = self._words["id"]
+        (self._days["due"] if name.isReadOnly() else name).setFocus()
 
     def has_id(self) -> bool:
         """Return whether an id is typed."""
-        return bool(self._id.text().strip())
+        return bool(self._words["id"].text().strip())
 
     def has_day(self) -> bool:
         """Return whether the fields of days are valid or empty."""
-        days = (self._due, self._certified)
-        return all(not d.text().strip() or d.value() is not None for d in days)
+        return all(
+            not day.text().strip() or day.value() is not None
+            for day in self._days.values()
+        )
 
-    def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
-        add_labelled(grid, self._labels[field], field, at=at)
-
+    @override
     def _refresh(self) -> None:
-        self._shape.setItemText(0, self.tr("Not specified"))
-        for index, shape in enumerate(ArtefactKind, start=1):
-            self._shape.setItemText(index, worded(KIND_WORDS[shape]))
-        for index, side in enumerate(SIDES):
-            self._side.setItemText(index, worded(SIDES[side]))
+        shape, side = self._choices["shape"], self._choices["side"]
+        shape.setItemText(0, self.tr("Not specified"))
+        for index, kind in enumerate(ArtefactKind, start=1):
+            shape.setItemText(index, worded(KIND_WORDS[kind]))
+        for index, words in enumerate(SIDES.values()):
+            side.setItemText(index, worded(words))

@@ -582,17 +582,23 @@ def test_a_pen_that_is_away_is_not_found(
     assert "No LED seen" in seen.words
 
 
-def test_too_few_views_do_not_say_that_a_pen_fits(seen: "Seen") -> None:
+def test_too_few_views_do_not_say_that_a_pen_fits(
+    seen: "Seen", monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen.page.entered()
     panel = seen.child(MatchPanel)
+    monkeypatch.setattr(panel, "_why_unknown", str)  # as with a camera
 
     panel.set_value(PenMatch(2, 2, np.full(10, 0.05), findings=()))
 
     assert "Tilt and turn the pen so that it is seen from all sides." in seen.words
 
 
-def test_findings_are_shown_and_mark_their_leds(seen: "Seen") -> None:
+def test_findings_are_shown_and_mark_their_leds(
+    seen: "Seen", monkeypatch: pytest.MonkeyPatch
+) -> None:
     panel = seen.child(MatchPanel)
+    monkeypatch.setattr(panel, "_why_unknown", str)  # as with a camera
     finding = Finding(message("match.unseen", led=7), (7,))
 
     panel.set_value(PenMatch(9, 9, np.full(10, 0.05), (finding,)))

@@ -42,11 +42,10 @@ def test_the_lens_field_is_mapped_where_the_images_support_one(qtbot: QtBot) -> 
     qtbot.addWidget(panel)
     panel.resize(1100, 900)
     panel.show()
-    *_, card = panel.cards()
+    *_, card = panel._cards
     assert not card.isVisible()
     panel.set_value(solution_with_lens(0.15))
     assert card.isVisible()
-    plot = card.plot
-    assert isinstance(plot, ArrowPlot)
+    (plot,) = card.findChildren(ArrowPlot)
     assert plot.accessibleName().startswith("Lens field")
     assert len(data_of(plot, pg.PlotCurveItem)[0]) > 6
