@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QApplication
 
 from lightpen import calibrate, detect, find_images, read_camera, read_pen, reported
 from lightpen.live.sources import SourceEnvironment
+from lightpen.logs import recent_lines, running_log
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
@@ -119,11 +120,6 @@ class Report:
             )
 
 
-# The checks of a self-test, in order.
-#
-# Only modules of Python itself are imported before the files are found to be whole.
-
-
 FILE_LIST = "files.sha256"
 
 
@@ -188,8 +184,6 @@ def test_program(file: Path) -> int:
 def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
     with report.check("files") as found:
         found.append(_checked_files())
-    from lightpen.logs import recent_lines, running_log
-
     stack.enter_context(running_log(logging.INFO))
     report.last_lines = recent_lines
     with report.check("imports") as found:
@@ -198,12 +192,10 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
         for name in names:
             importlib.import_module(name)
         found.append(", ".join(names))
-    # Everything below needs these imports.
-
     with report.check("window system") as found:
         desk = Desk(folder)
-        report.versions.update(desk.versions())
-        found.append(desk.platform())
+        report.versions.update(versions())
+        found.append(QGuiApplication.platformName())
     with report.check("fonts") as found:
         found.append(desk.tested_fonts())
     with report.check("window") as found:
@@ -274,10 +266,7 @@ LETTERS = "Aaµ°±光笔校准"
 
 
 class Desk:
-    """An application with its own data folder.
-
-    Images, results and settings are in a folder; nothing of the user's is touched.
-    """
+    """An application whose data and settings are in a folder of its own."""
 
     def __init__(self, folder: Path) -> None:
         self._data = folder / "data"
@@ -286,14 +275,6 @@ class Desk:
         if not has_display():
             os.environ["QT_QPA_PLATFORM"] = "offscreen"
         self._application = make_application(sys.argv[:1])
-
-    def versions(self) -> dict[str, str]:
-        """Return the versions of the program and its libraries."""
-        return versions()
-
-    def platform(self) -> str:
-        """Return the name of Qt's platform plugin."""
-        return QGuiApplication.platformName()
 
     def tested_fonts(self) -> str:
         """Return the fonts that were found to have all letters."""

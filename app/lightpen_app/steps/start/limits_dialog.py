@@ -351,20 +351,15 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
         self._show_which_temperature()
 
     def _on_field_changed(self) -> None:
-        typed = {
-            kind.name: self._fields[kind.name].value() / kind.times for kind in KINDS
-        }
+        typed: dict[str, float | None] = {}
+        for kind in KINDS:
+            value = self._fields[kind.name].value()
+            is_known = value != UNMEASURED.get(kind.name)
+            typed[kind.name] = value / kind.times if is_known else None
         focal_length = typed.pop("focal_length")
-        measured = {
-            name: None if (value := typed.pop(name)) == nothing else value
-            for name, nothing in UNMEASURED.items()
-        }
-        others = with_focal_length(replace(self._value, **typed), focal_length)
-        self._value = replace(
-            others,
-            temperature_c=measured["temperature_c"],
-            humidity_percent=measured["humidity_percent"],
-        )
+        assert focal_length is not None
+        changed = replace(self._value, **typed)  # type: ignore[arg-type]
+        self._value = with_focal_length(changed, focal_length)
         self._show_which_temperature()
         self.value_changed.emit()
 
