@@ -113,9 +113,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
         # Connections
         self._sidebar.step_chosen.connect(self._on_step_chosen)
-        self._sidebar.operator_view_chosen.connect(self._operator_action.toggle)
-        self._sidebar.help_chosen.connect(self._on_help_triggered)
-        self._sidebar.options_chosen.connect(self._show_options)
+        self._sidebar.operator_view.clicked.connect(self._operator_action.toggle)
+        self._sidebar.help.clicked.connect(self._on_help_triggered)
+        self._sidebar.options.clicked.connect(self._show_options)
         self._action_bar.main_pressed.connect(self._on_main_pressed)
         self._action_bar.back_pressed.connect(self.go_back)
         self._options.value_changed.connect(self.preferences_changed)

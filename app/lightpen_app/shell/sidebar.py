@@ -208,10 +208,6 @@ class Sidebar(Translated, QFrame):
     """The steps, with buttons for the functions of the function keys."""
 
     step_chosen = Signal(int)  # index of the step, which may be closed
-    # The buttons.
-    operator_view_chosen = Signal()
-    help_chosen = Signal()
-    options_chosen = Signal()
     # The item under calibration and the origin of its images, in one line; whether some
     # of it must not be used for measuring.
     subject_changed = Signal(str, bool)
@@ -228,10 +224,10 @@ class Sidebar(Translated, QFrame):
         self._status = SignLabel()
         self._remark = SignLabel()
         self._steps = StepList()
-        self._operator_view = PushButton()
-        self._help = PushButton()
-        self._options = PushButton()
-        buttons = (self._operator_view, self._help, self._options)
+        self.operator_view = PushButton()
+        self.help = PushButton()
+        self.options = PushButton()
+        buttons = (self.operator_view, self.help, self.options)
 
         # Layout
         self._layout = layout = vertical_layout(self)
@@ -249,9 +245,6 @@ class Sidebar(Translated, QFrame):
 
         # Connections
         self._steps.step_chosen.connect(self.step_chosen)
-        self._operator_view.clicked.connect(self.operator_view_chosen)
-        self._help.clicked.connect(self.help_chosen)
-        self._options.clicked.connect(self.options_chosen)
         self._scroll.height_changed.connect(self._reveal_present)
 
         self._value = Subject(Names(), Origin.LIVE)
@@ -327,14 +320,14 @@ class Sidebar(Translated, QFrame):
 
     def options_corner(self) -> QPoint:
         """Return the screen position of the top left of the options button."""
-        return self._options.mapToGlobal(QPoint(0, 0))
+        return self.options.mapToGlobal(QPoint(0, 0))
 
     def _refresh(self) -> None:
         self._show_subject()
         for button, text, key in (
-            (self._operator_view, self.tr("Operator view"), "F11"),
-            (self._help, self.tr("Help"), "F1"),
-            (self._options, self.tr("Options"), "F10"),
+            (self.operator_view, self.tr("Operator view"), "F11"),
+            (self.help, self.tr("Help"), "F1"),
+            (self.options, self.tr("Options"), "F10"),
         ):
             with_key = f"{text}  \u00b7  {key}"
             button.setText(text if self._room.is_narrow else with_key)

@@ -26,8 +26,8 @@ class AskingBar(QFrame):
 
     asking_changed = Signal()  # it asks, or no longer
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._had_focus: QWidget | None = None
         self.setProperty("area", "notice")
         set_tone(self, Tone.WARN)
@@ -60,8 +60,8 @@ class QuestionBar(Translated, AskingBar):
     agreed = Signal()
     declined = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._words: Callable[[], Question] = Question
         self._on_yes: Callable[[], object] = bool  # does nothing
 
@@ -159,8 +159,8 @@ class ReasonBar(AskingBar):
     given = Signal(str, object)
     declined = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._text = text_label(TextSize.BODY)

@@ -38,7 +38,6 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import set_tooltip
 from lightpen_app.widgets.controls import (
     ENTER_KEYS,
-    LEAST_WIDTH,
     LeavesPageKeys,
     PushButton,
     WidgetMixin,
@@ -272,11 +271,10 @@ class Translated(WidgetMixin):
         clicked: Callable[..., object] | SignalInstance | None = None,
         *,
         tip: str = "",
-        least_width: int = LEAST_WIDTH,
         checkable: bool = False,
     ) -> PushButton:
         """Return a button with its text, tool tip, and what a click does."""
-        button = self.say(PushButton(least_width, checkable=checkable), text, tip=tip)
+        button = self.say(PushButton(checkable=checkable), text, tip=tip)
         if clicked is not None:
             button.clicked.connect(clicked)
         return button
@@ -421,8 +419,8 @@ class SupervisorFields(Translated, QWidget):
     value_edited = Signal()  # something is being typed
     entered = Signal()  # the Enter key was pressed in the password
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._name = self.say(EnterEdit(), hint=self.tr("Supervisor"))

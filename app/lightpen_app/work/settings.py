@@ -86,6 +86,10 @@ class Station:
     temperature_day: str = ""  # see `Preparation`
 
 
+# What a station and a `Preparation` have alike.
+ALIKE = "limits", "assumptions", "method", "heading", "temperature_day"
+
+
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
     """Return the last selection at a station; its files are read later.
 
@@ -103,11 +107,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         camera_file=None,
         pen_file=None,
         mask=mask_of(camera.mask),
-        limits=station.limits,
-        assumptions=station.assumptions,
-        method=station.method,
-        heading=station.heading,
-        temperature_day=station.temperature_day,
+        **{name: getattr(station, name) for name in ALIKE},
     )
 
 
@@ -131,12 +131,8 @@ def station_of(
             unread.pen_units if pen_file is None else pen_file.units or "",
             unread.rig if rig_file is None else str(rig_file.path),
         ),
-        limits=preparation.limits,
-        assumptions=preparation.assumptions,
-        method=preparation.method,
         extensions=extensions,
-        heading=preparation.heading,
-        temperature_day=preparation.temperature_day,
+        **{name: getattr(preparation, name) for name in ALIKE},
     )
 
 

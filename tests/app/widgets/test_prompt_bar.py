@@ -1,6 +1,7 @@
 """A bar that asks borrows the focus, and gives it back."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import pytest
 from PySide6.QtCore import Qt
@@ -20,6 +21,8 @@ from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.widgets.bars import QuestionBar, ReasonBar
 from lightpen_app.widgets.fields import SupervisorFields
 from lightpen_app.work.workbench import Workbench
+
+W = TypeVar("W", bound=QWidget)
 
 
 @pytest.mark.parametrize("kind", [QuestionBar, ReasonBar])
@@ -51,9 +54,9 @@ def test_what_had_the_focus_before_a_question_has_it_again(
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda page, _: asked(QuestionBar(page)),
-        lambda page, _: asked(ReasonBar(page)),
-        lambda page, _: SupervisorFields(page).clear_password(),
+        lambda page, _: asked(on_page(page, QuestionBar())),
+        lambda page, _: asked(on_page(page, ReasonBar())),
+        lambda page, _: on_page(page, SupervisorFields()).clear_password(),
         lambda page, workbench: on_page(page, LedFilePanel(workbench)).ask_units("a"),
     ],
     ids=["question", "reason", "password", "units"],
@@ -75,7 +78,7 @@ def test_what_is_asked_on_a_page_that_is_not_shown_leaves_the_focus_where_it_is(
     assert field.hasFocus()
 
 
-def on_page(page: QWidget, panel: LedFilePanel) -> LedFilePanel:
+def on_page(page: QWidget, panel: W) -> W:
     panel.setParent(page)
     return panel
 

@@ -114,8 +114,7 @@ class CameraPage(Page):
     def _on_workbench_changed(self) -> None:
         now = self._selection.preparation
         self._view.source.set_value(now.source)
-        if self._view.beside.follow(now.source):
-            self._show_connection()  # the missing input may have changed
+        self._view.beside.follow(now.source)
         self._view.intrinsics.set_value(now.camera_file)
         self._view.intrinsics.set_image_size(now.image_size)
         self._view.intrinsics.setVisible(now.second is None)

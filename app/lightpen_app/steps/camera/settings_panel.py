@@ -111,8 +111,11 @@ class SettingsPanel(Translated, QGroupBox):
         fill(layout, self._hint, self._counts)
 
         # Connections
-        self._rate.value_changed.connect(self._on_rate_edited)
-        self._packet.value_changed.connect(self._on_packet_edited)
+        ask, chosen = self.settings_changed.emit, CameraSettings
+        self._rate.value_changed.connect(lambda rate: ask(chosen(frame_rate=rate)))
+        self._packet.value_changed.connect(
+            lambda size: ask(chosen(packet_size=round(size)))
+        )
         self._format.activated.connect(self._on_format_chosen)
         self._trigger.activated.connect(self._on_trigger_chosen)
         for field in (self._width, self._height, self._x, self._y):
@@ -192,12 +195,6 @@ class SettingsPanel(Translated, QGroupBox):
         self._whole.set_why_not(
             self.tr("The whole sensor is already in use.") if is_whole else ""
         )
-
-    def _on_rate_edited(self, rate: float) -> None:
-        self.settings_changed.emit(CameraSettings(frame_rate=rate))
-
-    def _on_packet_edited(self, size: float) -> None:
-        self.settings_changed.emit(CameraSettings(packet_size=round(size)))
 
     def _on_format_chosen(self, index: int) -> None:
         name = str(self._format.itemData(index))

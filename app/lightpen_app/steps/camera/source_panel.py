@@ -430,13 +430,11 @@ class BesideControl(QObject):
         # Connections
         panel.files_requested.connect(files.use_files)
 
-    def follow(self, source: SourceChoice) -> bool:
-        """Offer the files of a source; return whether the source has changed."""
-        is_other = source != self._source
-        if is_other:
+    def follow(self, source: SourceChoice) -> None:
+        """Offer the files of a source."""
+        if source != self._source:
             self._look(source)
         self._offer()
-        return is_other
 
     def shut_down(self) -> None:
         """Stop."""

@@ -13,7 +13,7 @@ from lightpen.model.names import Method
 from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_app.face import PressComparison, Service, Services, first_of, verify_step
+from lightpen_app.face import PressComparison, Services, first_of, verify_step
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.plots_panel import MethodsPanel
@@ -55,7 +55,7 @@ class ReviewPage(Page):
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
         self._painted: SwingAssessment | None = None  # since it is shown
-        comparison = first_of(services, Service.press_comparison)
+        comparison = first_of(services, lambda each: each.press_comparison())
         self._press = comparison or PressComparison()
         self._library, self._now = workbench.library, workbench.around.now
 

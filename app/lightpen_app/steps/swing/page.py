@@ -8,7 +8,7 @@ from lightpen.cameras.protocol import Connection
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.preparation import SourceKind
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_app.face import Service, Services, SimulatorControls, first_of
+from lightpen_app.face import Services, SimulatorControls, first_of
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds
@@ -55,7 +55,7 @@ class SwingPage(Page):
 
         # Widgets
         self._view = SwingView(self)
-        controls = first_of(services, Service.swing_controls)
+        controls = first_of(services, lambda each: each.swing_controls())
         self._simulator = controls or SimulatorControls(self._live)
         self._question = QuestionBar()
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)

@@ -130,7 +130,8 @@ def test_messages_take_no_more_room_than_they_need(qtbot: QtBot) -> None:
 def test_a_question_is_answered_once(qtbot: QtBot, answer: str, signal: str) -> None:
     around = QWidget()
     qtbot.addWidget(around)
-    bar = QuestionBar(around)
+    bar = QuestionBar()
+    bar.setParent(around)
     bar.set_words(lambda: Question("Really?", "Yes", "No"))
     around.show()
     assert bar.words() == ""
