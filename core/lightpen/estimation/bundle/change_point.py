@@ -145,13 +145,16 @@ def step_of_poses(poses: Poses, is_slipped: BoolArray) -> ChangePoint | None:
         return None
     after = np.arange(len(R)) >= step.first
     away = after if np.mean(after == is_slipped) > 0.5 else ~after
-    # Places in the frame that the step is in; those of a turned tip are in the pen.
-    tips = _Images(off, W, -W @ M, P)
-    places, weights = (tips.turned(R) if step.is_tip else tips)[:2]
-    moved = places[away] - places[~away].mean(axis=0)
-    beside = moved - np.median(moved, axis=0)
-    squares, left = (
-        np.einsum("ni,nij,nj->n", each, weights[away], each) for each in (moved, beside)
+    # The tip that all images share was drawn towards the step: fitted again with it.
+    own = R if step.is_tip else np.broadcast_to(-np.eye(3), R.shape)
+    A = np.concatenate([M, np.where(after[:, None, None], own, 0.0)], axis=2)
+    weighted = np.swapaxes(A, 1, 2) @ W
+    solution = np.linalg.solve(
+        (weighted @ A).sum(axis=0), -np.einsum("nki,ni->k", weighted, t)
+    )
+    left, squares = (
+        np.einsum("ni,nij,nj->n", each, W, each)[away]
+        for each in (A @ solution + t, own @ solution[6:])
     )
     limit = np.maximum(BY_CHANCE, BY_FILES * squares)
     explained = min(np.mean(away == is_slipped), np.mean(left < limit))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_centers import calibrate_pixels, observe_pixels, simulate_centers
+from tests.simulated_swings import SwingKind, swing_of_kind
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import leave_out
@@ -21,10 +22,12 @@ N, FIRST = 100, 62
 LIMITS = SwingLimits(max_uncertainty=0.05)
 
 
-def swung(kind: str, shift: FloatArray, seed: int = 0) -> Calibration:
+def swung(
+    kind: str, shift: FloatArray, seed: int = 0, motion: SwingKind = "field"
+) -> Calibration:
     """Calibrate a swing with a step before the image ``FIRST`` (from 0)."""
     rng = np.random.default_rng(seed)
-    swing = swing_poses(N, rng)
+    swing = swing_of_kind(N, rng, motion)
     R, t = swing.rotations.copy(), swing.translations.copy()
     if kind == "tip":
         t[FIRST:] -= R[FIRST:] @ shift
@@ -66,6 +69,15 @@ def test_a_step_is_found_with_its_image_and_kind(kind: str, shift: list[float]) 
     assert verdict.next_step is NextStep.USE_PART
     assert verdict.reason.values["begin"] == 1
     assert verdict.reason.values["end"] == found.step.first
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_large_step_is_found_on_the_path_of_a_hand(seed: int) -> None:
+    found = swung("cone", np.array([0.2, -0.26, 0.37]), seed, "operator")
+
+    assert found.step is not None
+    assert (found.step.first, found.step.is_tip) == (FIRST, False)
+    assert judge(found, LIMITS).reason.code == Code.STEP
 
 
 @pytest.mark.parametrize("seed", range(4))
