@@ -21,7 +21,7 @@ from lightpen_app.look.figures import (
 )
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.plots import SYMBOL, SYMBOLS, TONES, Plot
+from lightpen_app.widgets.plots import TONES, Plot
 
 HEAD = 4 * GRID  # px, above the bars of a budget
 GROUP = 0.8  # of the room for a label, that its bars fill
@@ -130,12 +130,22 @@ def _around(points: FloatArray) -> QRectF:
     return QRectF(float(low[0]) - room, float(low[1]) - room, width, height)
 
 
-class NamedPlot(Plot):
-    """A plot of one or more series; several are named beside the title."""
+class BarPlot(Plot):
+    """A group of bars for each label, one bar a series, in their order.
+
+    Several series are named beside the title.
+    """
 
     def __init__(self, axes: Axes, names: Sequence[str]) -> None:
         self._names = tuple(names)
+        self._bars: list[pg.BarGraphItem] = []
         super().__init__(axes)
+        for _ in names:
+            bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
+            self._item.addItem(bars)
+            self._bars.append(bars)
+
+        self._restyle()
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the series."""
@@ -149,20 +159,6 @@ class NamedPlot(Plot):
     @override
     def _named_curves(self) -> tuple[str, ...]:
         return self._names if len(self._names) > 1 else ()
-
-
-class BarPlot(NamedPlot):
-    """A group of bars for each label, one bar a series, in their order."""
-
-    def __init__(self, axes: Axes, names: Sequence[str]) -> None:
-        self._bars: list[pg.BarGraphItem] = []
-        super().__init__(axes, names)
-        for _ in names:
-            bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
-            self._item.addItem(bars)
-            self._bars.append(bars)
-
-        self._restyle()
 
     def set_data(self, labels: Sequence[str], *values: FloatArray) -> None:
         """Show values (N,) of each series for N labels; NaN leaves a gap."""
@@ -183,36 +179,6 @@ class BarPlot(NamedPlot):
         colors = colors_of(self.palette())
         for bars, tone in zip(self._bars, TONES, strict=False):
             bars.setOpts(pen=pg.mkPen(None), brush=pg.mkBrush(colors.tone(tone)))
-
-
-class MarkPlot(NamedPlot):
-    """Values as marks over a number; at most three series."""
-
-    has_symbols = True
-
-    def __init__(self, axes: Axes, names: Sequence[str]) -> None:
-        self._curves: list[pg.PlotDataItem] = []
-        super().__init__(axes, names)
-        for _, symbol in zip(names, SYMBOLS, strict=False):
-            curve = pg.PlotDataItem(pen=None, symbol=symbol, symbolSize=SYMBOL)
-            self._item.addItem(curve)
-            self._curves.append(curve)
-        self._restyle()
-
-    def set_data(self, x: FloatArray, *values: FloatArray) -> None:
-        """Show values (N,) of each series over x (N,)."""
-        for curve, value in zip(self._curves, values, strict=True):
-            known = np.isfinite(value)
-            curve.setData(x[known], value[known])
-        self._fit(x, np.concatenate(values))
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        colors = colors_of(self.palette())
-        for curve, tone in zip(self._curves, TONES, strict=False):
-            curve.setSymbolPen(pg.mkPen(None))
-            curve.setSymbolBrush(pg.mkBrush(colors.tone(tone)))
 
 
 class PosturePlot(SquarePlot):

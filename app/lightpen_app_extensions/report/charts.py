@@ -9,38 +9,12 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen_app.look.figures import budget_figure
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.result_plots import ArrowPlot, BudgetPlot, MarkPlot
+from lightpen_app.widgets.result_plots import ArrowPlot, BudgetPlot
 
 translate = QCoreApplication.translate
 
-HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
 
-
-def charts_of(calibration: CalibrationRecord) -> dict[str, Figure]:
-    """Return the plots by their names in the template."""
-    return {"budget_plot": _budget(calibration), "misfits": _misfits(calibration)}
-
-
-def _misfits(calibration: CalibrationRecord) -> Figure:
-    """Return the misfit of each image; one that takes no part is apart."""
-    misfits = np.array([f.rms_px for f in calibration.frames], dtype=np.float64)
-    used = np.array([f.used for f in calibration.frames], dtype=bool)
-    top = HEADROOM * float(np.nanmax(misfits[used], initial=1e-6))
-    heights = np.where(np.isfinite(misfits), np.minimum(misfits, top), top)
-    names = translate("paper", "included"), translate("paper", "excluded")
-    plot = MarkPlot(
-        Axes(
-            translate("paper", "RMS residual per image / px"),
-            translate("paper", "image"),
-        ),
-        names,
-    )
-    parts = (np.where(part, heights, np.nan) for part in (used, ~used))
-    plot.set_data(np.arange(1.0, len(misfits) + 1), *parts)
-    return plot
-
-
-def _budget(calibration: CalibrationRecord) -> Figure:
+def budget_plot(calibration: CalibrationRecord) -> Figure:
     """Return the parts of U along its weakest direction."""
     plot = BudgetPlot(
         Axes(translate("paper", "U (k = 2) by source, weakest direction / mm"))

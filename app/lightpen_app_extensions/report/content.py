@@ -42,14 +42,8 @@ from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.swings.header import Names
 from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.phrases import grade_text, origin_text, reason_text, share_text
-from lightpen_app.look.words import (
-    AXES,
-    MAX_DECIMALS,
-    MICROMETRES,
-    decimals_for,
-    number_text,
-)
-from lightpen_app_extensions.report.charts import charts_of, points_plot
+from lightpen_app.look.words import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app_extensions.report.charts import budget_plot, points_plot
 from lightpen_app_extensions.report.pages import Margins, PrintReport
 from lightpen_app_extensions.report.template import (
     ANCHOR,
@@ -200,7 +194,6 @@ def _calibration_report(content: ReportContent, file: CalibrationFile) -> PrintR
     given = (names.pen, names.tip, names.cone, names.station, names.operator)
     dropped = calibration.images.dropped
     nominal, change = file.nominal_tip, file.change
-    cameras = calibration.inputs.cameras  # of a rig; the record has the first one's
     own = {
         **_proof(content, file.name, file.sha256, file.traced, file.origin),
         "correlation": factor if factor > 1 else None,
@@ -208,7 +201,6 @@ def _calibration_report(content: ReportContent, file: CalibrationFile) -> PrintR
         "from_nominal": None if nominal is None else file.tip_pen - nominal,
         "change_u": None if change is None else max(change.expanded_uncertainty_mm),
         "status": _status(file),
-        "of_camera": f" ({cameras[0].file})" if cameras else "",
         "signer": translate("paper", "Calibrated by"),
         "unprintable": any(
             printed_text(each) != each for each in (*given, file.reason)
@@ -221,15 +213,13 @@ def _calibration_report(content: ReportContent, file: CalibrationFile) -> PrintR
             (f.rms_px or 0.0 for f in calibration.frames if f.used), default=0
         ),
         "rules": decision_rule(calibration.verdict.limits),
-        "led_shifts": _led_shifts(calibration),
-        "intrinsics": _intrinsics(calibration),
         "files": _calibration_files(calibration),
         "n_observations": len(calibration.inputs.observations),
         **_budget(calibration),
     }
     filled = Content(
         (own, file, calibration),
-        charts_of(calibration),
+        {"budget_plot": budget_plot(calibration)},
         {"verdict": [_verdict(file.grade, [worded(file.why), _acceptance(file)])]},
     )
     badges = [] if file.grade is Grade.PASS else [grade_text(file.grade)]
@@ -303,28 +293,6 @@ def _budget(calibration: CalibrationRecord) -> dict[str, Any]:
             MICROMETRES * calibration.weakest_direction.expanded_uncertainty_mm, digits
         ),
     }
-
-
-def _led_shifts(calibration: CalibrationRecord) -> list[tuple[Any, float, str]]:
-    """Return each LED, its distance from its place in the file, and what that is."""
-    word = translate("paper", "outlier")
-    shifts = np.array([e.displacement_mm for e in calibration.leds], dtype=np.float64)
-    lengths = MICROMETRES * np.linalg.norm(shifts, axis=1)
-    return [
-        (led, length, word if led.displaced else "")
-        for led, length in zip(calibration.leds, lengths.tolist(), strict=True)
-    ]
-
-
-def _intrinsics(calibration: CalibrationRecord) -> Iterator[tuple[str, str, str]]:
-    for name, each in calibration.adjusted.intrinsics.items():
-        title = f"{name} / px" if name in ("fx", "fy", "cx", "cy") else name
-        u = each.standard_uncertainty
-        decimals = MAX_DECIMALS if u is None else decimals_for(u)
-        if u is not None and decimals == MAX_DECIMALS:  # coefficients have more
-            decimals += decimals_for(10.0**MAX_DECIMALS * u)
-        of_u = UNKNOWN if u is None else number_text(u, decimals)
-        yield title, number_text(each.value, decimals), of_u
 
 
 def _calibration_files(calibration: CalibrationRecord) -> list[tuple[str, Any]]:

@@ -98,8 +98,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         pages = self._pages.findChild(QGraphicsView)
         assert pages is not None  # else the width changes as the bar comes
         pages.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
-        self._smaller = self.make_button(self.tr("Smaller"))
-        self._larger = self.make_button(self.tr("Larger"))
         self._save = self.make_button(self.tr("Save as PDF..."), self._ask_file)
         self._print = self.make_button(self.tr("Print..."), self._ask_printer)
         self._close = self.make_button(self.tr("Close"))
@@ -108,13 +106,10 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         # Layout
         shown = (self._pages, 1), self._progress, self._said
         layout = vertical_layout(self, *shown, margins=GRID)
-        zoom = self._smaller, self._larger
-        horizontal_layout(layout, *zoom, 1, self._print, self._save, self._close)
+        horizontal_layout(layout, 1, self._print, self._save, self._close)
 
         # Connections
         self._pages.paintRequested.connect(partial(paint_on, report))
-        self._smaller.clicked.connect(self._pages.zoomOut)
-        self._larger.clicked.connect(self._pages.zoomIn)
         self._close.clicked.connect(self.close)
         self.saved.connect(self._on_saved)
         self.failed.connect(self._on_failed)
@@ -126,10 +121,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         super().closeEvent(event)
         if self._saving is None:  # else it reports it first
             self.deleteLater()
-
-    def n_pages(self) -> int:
-        """Return the number of pages."""
-        return self._pages.pageCount()
 
     def _refresh(self) -> None:
         self.setWindowTitle(self._report.margins.title)

@@ -6,7 +6,7 @@ blank lines, and begin with a mark of their size or with what they show:
     :facts COLUMNS       names and values, a line each
     :table WIDTHS        columns, > right-aligned, titles, and rows below
     :small WIDTHS        the same in small letters
-    :charts HEIGHT NAMES plots side by side, mm high
+    :chart HEIGHT NAME   a plot, mm high
     :draw NAME           what is made by the program
     :include SECTION     another section
     :sign                fields for signatures
@@ -70,7 +70,6 @@ MARKS = {  # of a paragraph: its tag and its class
 ANCHOR = "<a></a>"  # at the beginning of a part, where `pages` looks for it
 MM = 720 / 25.4  # in dots, ten to a point, so that text is measured as printed
 WIDTH = 178 * MM  # of what is on a page
-GAP = 160.0  # between plots side by side, dots
 
 
 class PrintSize(IntEnum):
@@ -213,18 +212,11 @@ def _table_of(head: str, lines: Sequence[str]) -> tuple[Piece, ...]:
     return (Piece(f'<table width="100%" cellspacing="0">{head}{body}</table>'),)
 
 
-def charts(plots: Mapping[str, Figure], height: float) -> tuple[Piece, ...]:
-    """Return plots side by side, dots high."""
-    if not plots:
-        return ()
-    width = (WIDTH - (len(plots) - 1) * GAP) / len(plots)
-    images = "".join(
-        f'<td><img src="{name}" width="{width}" height="{height}"></td>'
-        for name in plots
-    )
-    (part,) = _table_of("", [images])
-    made = {name: drawn(plot, width, height) for name, plot in plots.items()}
-    return (replace(part, plots=made),)
+def chart(name: str, plot: Figure, height: float) -> Piece:
+    """Return a plot, dots high."""
+    image = f'<td><img src="{name}" width="{WIDTH}" height="{height}"></td>'
+    (part,) = _table_of("", [image])
+    return replace(part, plots={name: drawn(plot, WIDTH, height)})
 
 
 def signatures(names: Sequence[str], below: str) -> Piece:
@@ -286,9 +278,10 @@ def _parts(
         case ":sign":
             ((*names, below),) = _filled(lines, content.scope)
             return [signatures(names, below)]
-        case ":charts":
-            there = {n: content.charts[n] for n in words[1:] if n in content.charts}
-            return charts(there, float(words[0]) * MM)
+        case ":chart":
+            height, name = words
+            plot = content.charts.get(name)
+            return [] if plot is None else [chart(name, plot, float(height) * MM)]
         case ":facts":
             unstated = translate("paper", "not stated")
             named = [

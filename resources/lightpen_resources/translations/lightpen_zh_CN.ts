@@ -2920,14 +2920,6 @@
         <translation>页面</translation>
     </message>
     <message>
-        <source>Smaller</source>
-        <translation>缩小</translation>
-    </message>
-    <message>
-        <source>Larger</source>
-        <translation>放大</translation>
-    </message>
-    <message>
         <source>Save as PDF...</source>
         <translation>另存为 PDF...</translation>
     </message>
@@ -8668,24 +8660,8 @@
 <context>
     <name>paper</name>
     <message>
-        <source>included</source>
-        <translation>已计入</translation>
-    </message>
-    <message>
-        <source>excluded</source>
-        <translation>已剔除</translation>
-    </message>
-    <message>
-        <source>RMS residual per image / px</source>
-        <translation>各图像的残差均方根 / px</translation>
-    </message>
-    <message>
         <source>U (k = 2) by source, weakest direction / mm</source>
         <translation>各来源的 U (k = 2)，最弱方向 / mm</translation>
-    </message>
-    <message>
-        <source>image</source>
-        <translation>图像</translation>
     </message>
     <message>
         <source>Page {0} of {1}</source>
@@ -8750,10 +8726,6 @@
     <message>
         <source>assumed</source>
         <translation>假定</translation>
-    </message>
-    <message>
-        <source>outlier</source>
-        <translation>离群值</translation>
     </message>
     <message>
         <source>Camera</source>

@@ -23,7 +23,6 @@ from lightpen_app.widgets.result_plots import (
     ArrowPlot,
     BarPlot,
     BudgetPlot,
-    MarkPlot,
     PosturePlot,
 )
 
@@ -275,14 +274,12 @@ def test_the_name_of_an_axis_that_is_too_short_for_it_is_left_out(qtbot: QtBot) 
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
-    plot = MarkPlot(Axes("Tip"), ("x", "y"))
-    show(qtbot, plot)
     bars = BarPlot(Axes("U"), ("x", "y"))
     show(qtbot, bars)
 
-    for each in (plot, bars):
-        each.set_names(["a", "b"])
-        assert each.names() == ("a", "b")
+    bars.set_names(["a", "b"])
+
+    assert bars.names() == ("a", "b")
 
 
 def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) -> None:
@@ -302,16 +299,13 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
 def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
     bars = BarPlot(Axes("LEDs"), ("rms",))
-    lines = MarkPlot(Axes("Tip"), ("x",))
-    for plot in (bars, lines):
-        show(qtbot, plot)
-    before = len(items_on(bars)), len(items_on(lines))
+    show(qtbot, bars)
+    before = len(items_on(bars))
 
     for n in range(2, 30):
         bars.set_data([str(i) for i in range(n)], np.ones(n))
-        lines.set_data(np.arange(float(n)), np.ones(n))
 
-    assert (len(items_on(bars)), len(items_on(lines))) == before
+    assert len(items_on(bars)) == before
 
 
 def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:

@@ -8,9 +8,9 @@ from PySide6.QtGui import QTextDocument
 
 from lightpen_app.look.words import unbroken
 from lightpen_app.widgets.figure import Axes
-from lightpen_app.widgets.result_plots import MarkPlot
+from lightpen_app.widgets.result_plots import BarPlot
 from lightpen_app_extensions.report.pages import ROOM, lay_out
-from lightpen_app_extensions.report.template import Piece, charts, paragraph, table
+from lightpen_app_extensions.report.template import Piece, chart, paragraph, table
 
 pytestmark = pytest.mark.usefixtures("qapp")
 N_LINES = 44  # paragraphs of a line that fit on a page
@@ -71,8 +71,8 @@ def test_the_head_of_a_table_is_repeated_where_it_goes_on() -> None:
 
 
 def test_plots_are_as_wide_and_high_as_stated() -> None:
-    plot = MarkPlot(Axes("tip"), ("x",))
-    document = lay_out(charts({"tip": plot}, 1000.0))
+    plot = BarPlot(Axes("tip"), ("x",))
+    document = lay_out([chart("tip", plot, 1000.0)])
 
     assert document.documentLayout().documentSize().height() >= 1000
     assert document.pageCount() == 1

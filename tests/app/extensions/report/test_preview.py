@@ -43,7 +43,7 @@ def window(
 def test_escape_closes_it_and_nothing_is_scrolled_to_the_sides(
     qtbot: QtBot, window: PrintReportWindow
 ) -> None:
-    qtbot.waitUntil(lambda: window.n_pages() > 1)
+    qtbot.waitUntil(lambda: window._pages.pageCount() > 1)
     pages = window.findChild(QGraphicsView)
     assert pages is not None
     assert pages.horizontalScrollBar().maximum() == 0

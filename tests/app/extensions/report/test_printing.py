@@ -243,7 +243,7 @@ def test_a_character_that_no_font_has_is_reported_by_its_number(
     assert "U+" not in plain
 
 
-def test_the_camera_is_named_whose_parameters_are_listed(
+def test_each_camera_of_a_rig_is_among_the_files(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:
     files = stated["inputs"]
@@ -253,7 +253,8 @@ def test_the_camera_is_named_whose_parameters_are_listed(
 
     reported = " ".join(" ".join(page) for page in words(printed(other)))
 
-    assert "Camera parameters from the images (a.yaml)" in reported
+    assert "Camera a.yaml" in reported
+    assert "Camera b.yaml" in reported
 
 
 def test_the_pdf_holds_all_that_an_archive_asks_of_it(

@@ -130,6 +130,6 @@ def test_what_is_kept_stands_on_one_page(fill_lines: Fill) -> None:
 
 def test_an_unknown_command_or_name_is_a_mistake(fill_lines: Fill) -> None:
     with pytest.raises(ValueError, match=":chart"):
-        fill_lines(":chart 50 misfits", Content(()))
+        fill_lines(":charts 50 misfits", Content(()))
     with pytest.raises(KeyError, match="age"):
         fill_lines("Age {age}", Content(()))

@@ -570,7 +570,7 @@ def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     desk.until(lambda: desk.page.findChildren(PrintReportWindow))
 
     window = desk.child(PrintReportWindow)
-    desk.until(lambda: window.n_pages() > 2)
+    desk.until(lambda: window._pages.pageCount() > 2)
     window.close()
 
     first = FolderArchive(folder).all_files()[0]
@@ -630,7 +630,7 @@ def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
     desk.click("Repeatability report...")
     desk.until(lambda: desk.page.findChildren(PrintReportWindow))
     window = desk.child(PrintReportWindow)
-    desk.until(lambda: window.n_pages() > 0)
+    desk.until(lambda: window._pages.pageCount() > 0)
     window.close()
     desk.until(lambda: len(desk.column(WHAT)) == 6)
     assert desk.notices == []
@@ -648,7 +648,7 @@ def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
     desk.click("Verification report...")
     desk.until(lambda: desk.page.findChildren(PrintReportWindow))
     window = desk.child(PrintReportWindow)
-    desk.until(lambda: window.n_pages() > 0)
+    desk.until(lambda: window._pages.pageCount() > 0)
     assert window.windowTitle() == "Verification report"
     window.close()
     assert desk.notices == []

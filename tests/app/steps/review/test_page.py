@@ -1217,7 +1217,7 @@ def test_the_record_on_paper_is_of_the_result_on_the_disk(
     qtbot.waitUntil(lambda: bool(page.findChildren(PrintReportWindow)))
 
     window = the(page, PrintReportWindow)
-    qtbot.waitUntil(lambda: window.n_pages() > 2)
+    qtbot.waitUntil(lambda: window._pages.pageCount() > 2)
     window.close()
 
 
