@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.workers import Workers
+from tests.simulated_rigs import from_first, row_of_cameras
 from tests.simulated_swings import swing_of_kind
 
 from lightpen.arrays import FloatArray
@@ -24,8 +25,6 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen, effective_tip
 from lightpen.model.rigid import Rig, fit_rigid, rig_of, rotation_from_vector
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,

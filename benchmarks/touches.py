@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from benchmarks.station import BASELINE, drawn_rig
 from tests.simulated_centers import simulate_centers
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -24,8 +25,6 @@ from lightpen_extensions.measure.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.workers import Workers
 from tests.simulated_centers import simulate_centers, simulate_rig_centers
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -29,8 +30,6 @@ from lightpen.model.camera import Camera
 from lightpen.model.limits import USUAL, SwingLimits
 from lightpen.model.pen import Pen, effective_tip
 from lightpen.model.rigid import Rig, directions_of, rig_of, rotation_from_vector
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,

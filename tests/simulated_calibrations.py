@@ -10,6 +10,7 @@ from tests.simulated_centers import (
     simulate_centers,
     simulate_rig_centers,
 )
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
@@ -22,8 +23,6 @@ from lightpen.model.ellipse import disc_images
 from lightpen.model.fisheye import LensField
 from lightpen.model.pen import Pen, effective_tip, grown
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Postures,

@@ -536,7 +536,6 @@ def test_a_simulated_set_has_the_files_of_the_shared_sets(
         "--images 2.5",
         "--binning 3",
         "--cameras 0",
-        "--baseline nan",
     ],
 )
 def test_a_senseless_simulation_is_refused(

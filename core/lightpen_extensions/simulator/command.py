@@ -3,11 +3,9 @@
 import argparse
 from pathlib import Path
 
-from lightpen.commands.arguments import number_from, whole_number
+from lightpen.commands.arguments import whole_number
 from lightpen.commands.console import printing, progress, shown
 
-MAX_RIG = 4  # simulated cameras
-BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
 MAX_RENDERED = 30_000  # images
 
 
@@ -39,17 +37,9 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cameras",
         type=int,
-        choices=range(1, MAX_RIG + 1),
+        choices=(1, 2),
         default=1,
-        help="number of cameras in a row, each facing the pen; with several, OUT "
-        "gets one folder per camera, and rig.json",
-    )
-    parser.add_argument(
-        "--baseline",
-        type=number_from(*BASELINES, "baseline", "mm"),
-        default=1000.0,
-        metavar="MM",
-        help="distance from the first to the last camera",
+        help="number of cameras; with two, OUT gets a folder for each, and rig.json",
     )
 
 
@@ -66,7 +56,7 @@ def _n_images(text: str) -> int:
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen_extensions.simulator.scene_files import write_rig_scene, write_scene
-    from lightpen_extensions.simulator.scenes import Scene, row_of_cameras
+    from lightpen_extensions.simulator.scenes import Scene, beside
     from lightpen_extensions.simulator.swings import paper_camera
 
     camera = paper_camera(options.binning)
@@ -76,7 +66,7 @@ def _simulate(options: argparse.Namespace) -> None:
             x, y, z = write_scene(scene, options.out, report)
             written = f"{scene.n_images} images, camera.yaml"
         else:
-            rig = row_of_cameras(options.cameras, options.baseline, options.binning)
+            rig = beside(camera, scene.cone_cam)
             x, y, z = write_rig_scene(scene, rig, options.out, report)
             folders = ", ".join(rig.names)
             written = (

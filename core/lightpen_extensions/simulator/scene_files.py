@@ -78,18 +78,16 @@ def write_rig_scene(
     """Write the images of a swing by several cameras; see `write_scene`.
 
     One folder for each camera, and a camera file beside it; ``rig.json``, ``leds.csv``,
-    ``truth.json``. The scene's camera stands for the middle of the rig, from which
-    cam_from_rig is, with the covariance that its file states.
+    ``truth.json``. The scene's camera is the first of the rig.
     """
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
     _make_folders(folder, *(folder / name for name in rig.names))
     mark_simulated(folder)
     plans = plan_rig(scene, rig)
-    there = from_first(rig)
     camera_files = [f"{name}.yaml" for name in rig.names]
     for camera, file in zip(rig.cameras, camera_files, strict=True):
         write_camera(camera, folder / file)
-    write_rig(there, folder / "rig.json", camera_files)
+    write_rig(rig, folder / "rig.json", camera_files)
     _write_measured_pen(plans[0], folder)
     views = []
     for c, (name, plan) in enumerate(zip(rig.names, plans, strict=True)):
@@ -99,8 +97,8 @@ def write_rig_scene(
 
         _write_images(plan, folder / name, names, part)
         cam_from_rig = {
-            "rotation": there.rotations[c].tolist(),
-            "translation": there.translations[c].tolist(),
+            "rotation": rig.rotations[c].tolist(),
+            "translation": rig.translations[c].tolist(),
         }
         truth = scene_truth(plan, f"{name}/")
         views.append({"name": name, "cam_from_rig": cam_from_rig, **truth})
@@ -255,11 +253,3 @@ def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
         }
         for led in range(pen.n_leds)
     ]
-
-
-def from_first(rig: Rig) -> Rig:
-    """Return a rig without covariance, expressed in the frame of its first camera."""
-    rotations = rig.rotations @ rig.rotations[0].T
-    translations = rig.translations - rotations @ rig.translations[0]
-    rotations[0], translations[0] = np.eye(3), 0.0  # exactly, whatever was rounded
-    return replace(rig, rotations=rotations, translations=translations)

@@ -167,32 +167,10 @@ class Scene:
     viewpoint: int = 0  # index of the camera in the rig, from 0; it selects the noise
 
 
-NAMES = ("left", "right", "third", "fourth")
 LENS_SPREAD = 0.004  # of the focal length, from one lens of a kind to the next
-CENTRE_SPREAD = np.array([7.0, -5.0])  # px
 ROTATION_SIGMA = 1e-4  # rad, of a rig that was calibrated with a board
 TRANSLATION_SIGMA = 0.1  # mm
 BASELINE = 500.0  # mm, of a camera and the one beside it
-
-
-def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
-    """Return 2 to 4 cameras in a row about the paper's camera position.
-
-    The baseline is from the first to the last, mm.
-    """
-    u, _, w = PAPER_CONE
-    places = np.linspace(-baseline / 2, baseline / 2, n_cameras)
-    turns = np.zeros((n_cameras, 3))
-    turns[:, 1] = np.arctan2(u, w) - np.arctan2(u - places, w)
-    rotations = rotation_from_vector(turns)
-    sigmas = np.tile(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3), n_cameras - 1)
-    return Rig(
-        cameras=tuple(_camera(number, binning) for number in range(n_cameras)),
-        rotations=rotations,
-        translations=-rotations[:, :, 0] * places[:, None],
-        covariance=np.diag(sigmas**2),
-        names=NAMES[:n_cameras],
-    )
 
 
 def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
@@ -205,15 +183,5 @@ def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
         rotations=np.stack([np.eye(3), R]),
         translations=np.stack([np.zeros(3), -BASELINE * R[:, 0]]),
         covariance=np.diag(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3) ** 2),
-        names=NAMES[:2],
-    )
-
-
-def _camera(number: int, binning: int) -> Camera:
-    """Return the paper's camera with another lens."""
-    camera = paper_camera(binning)
-    longer = 1 + LENS_SPREAD * number
-    cx, cy = np.array([camera.cx, camera.cy]) + CENTRE_SPREAD * number / binning
-    return replace(
-        camera, fx=longer * camera.fx, fy=longer * camera.fy, cx=float(cx), cy=float(cy)
+        names=("left", "right"),
     )

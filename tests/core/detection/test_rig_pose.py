@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from tests.accepted_tip import Hold, Holder, seen_by
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.detection.pen_detection import unseen
 from lightpen.detection.pose import fit_poses
@@ -11,8 +12,6 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import fit_rig_poses
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.measure.probing.instruments import see_together
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 RIG = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.small_records import entries_of
 from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
@@ -33,8 +34,6 @@ from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rotation_from_vector
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     operator_postures,

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.errors import FileError
 from lightpen.formats.rig_files import RigFile, read_rig, write_camera, write_rig
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 
 RIG = from_first(row_of_cameras(3, 900.0))
 FILES = tuple(f"{name}.yaml" for name in RIG.names)

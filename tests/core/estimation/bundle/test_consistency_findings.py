@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_centers import calibrate_pixels, observe_pixels, simulate_centers
+from tests.simulated_rigs import row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.consistency_findings import (
@@ -19,7 +20,6 @@ from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

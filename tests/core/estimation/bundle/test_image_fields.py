@@ -9,6 +9,7 @@ from tests.simulated_centers import (
     simulate_centers,
     simulate_rig_centers,
 )
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import FoundField, adjust, found_fields
@@ -19,8 +20,6 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.model.camera import Camera
 from lightpen.model.fisheye import LensField
 from lightpen.model.limits import USUAL
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_rigs import row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.priors import priors_of, thermal_growth
@@ -11,7 +12,6 @@ from lightpen.model.fisheye import LensField
 from lightpen.model.limits import USUAL, Assumptions
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import Rig, rig_of
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.image_fields import image_fields, seat_modes_of
@@ -15,8 +16,6 @@ from lightpen.estimation.bundle.noise_correlation import (
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.model.limits import USUAL
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, seen_from, swing_poses
 
 N_IMAGES, N_ROWS, N_COMMON = 7, 8, 4

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.simulated_centers import calibrate_pixels, simulate_centers
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
@@ -16,8 +17,6 @@ from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import nearest_rotation, vector_from_rotation
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

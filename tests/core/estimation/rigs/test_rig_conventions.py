@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_rigs import from_first, row_of_cameras
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.rigs.rig_poses import InitialExtrinsics, require_usual_rig
 from lightpen.messages import Message
 from lightpen.model.rigid import Rig, rotation_from_vector
-from lightpen_extensions.simulator.scene_files import from_first
-from lightpen_extensions.simulator.scenes import row_of_cameras
 
 RIG = from_first(row_of_cameras(3, 1000.0))
 

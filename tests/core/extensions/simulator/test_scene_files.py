@@ -28,7 +28,7 @@ from lightpen_extensions.simulator.scene_files import (
     write_rig_scene,
     write_scene,
 )
-from lightpen_extensions.simulator.scenes import Scene, Sensor, row_of_cameras
+from lightpen_extensions.simulator.scenes import Scene, Sensor, beside
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera
 
 
@@ -172,7 +172,7 @@ def test_a_set_is_not_written_over_nor_mixed_with_another(
     write_scene(replace(SMALL, n_images=1), folder)
     before = {path: path.read_bytes() for path in folder.rglob("*.*")}
     other = replace(SMALL, n_images=n_images, seed=6)
-    rig = row_of_cameras(2, 1000.0, 4)
+    rig = beside(SMALL.camera, PAPER_CONE)
     for write in (partial(write_scene, other), partial(write_rig_scene, other, rig)):
         with pytest.raises(FileError, match="nothing is overwritten"):
             write(folder)

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_rigs import row_of_cameras
 
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.measure.probing.instruments import (
     instrument_of_files,
     with_rig,
 )
-from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import PAPER_TIP, paper_camera, paper_pen
 
 RIG = rig_of(paper_camera())
