@@ -100,11 +100,13 @@ def parse_json(text: str, name: str) -> Tree:
 def parse_yaml(text: str, name: str) -> Tree:
     """Return the tree of a YAML text; see `parse_document`.
 
-    The directive ``%YAML:1.0`` of OpenCV, which is no valid YAML, is skipped.
+    The directive ``%YAML:1.0`` of OpenCV, which is no valid YAML, is skipped; with it
+    there need be no blank before a number (``Viewer.PointSize:2`` of ORB-SLAM).
     """
     loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
     if text.startswith("%YAML"):
         text = re.sub(_YAML_DIRECTIVE, "", text, count=1)
+        text = re.sub(r"(?m)^([A-Za-z][\w.]*):(?=[-.\d])", r"\1: ", text)
     try:
         return _yaml_document(_limited(yaml.parse(text, Loader=loader), name), name)
     except yaml.MarkedYAMLError as error:
