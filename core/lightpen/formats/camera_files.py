@@ -87,7 +87,10 @@ LARGEST_AMPLITUDE = 10.0  # px, of a lens field; more is another distortion
 SHORTEST_LENGTH = 10.0  # px
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
-_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix", "intrinsics")
+_MATRIX = (
+    *("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix", "intrinsics"),
+    "camera_intrinsics",
+)
 _COVARIANCE = ("intrinsics_covariance",)
 _DEVIATIONS = (
     *("std_deviations_intrinsics", "standard_deviations_intrinsics"),

@@ -35,7 +35,7 @@ _SIZE = (
 DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coef"),
     *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
-    "dist_coefs",
+    *("dist_coefs", "camera_extrinsics"),  # as PhotonVision named them before 2024
 )
 
 
@@ -115,20 +115,6 @@ LAYOUTS = (
         ),
         model="polymorphic_name",
         brown="libcalibcameramodelopencv libcalibcameramodelmatlab",
-    ),
-    FileLayout(
-        "Zivid",
-        marks="version CameraIntrinsics",
-        numbers=_each("fx fy cx cy", "CameraIntrinsics/CameraMatrix/{}")
-        | _each("k1 k2 p1 p2 k3", "CameraIntrinsics/Distortion/{}"),
-    ),
-    FileLayout(
-        "PhotonVision",
-        marks="cameraIntrinsics",
-        numbers={
-            "cameraIntrinsics": "fx skew cx - fy cy - - -",
-            "distCoeffs|cameraExtrinsics": _RADIAL,
-        },
     ),
     FileLayout(
         "RealSense",

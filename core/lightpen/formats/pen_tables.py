@@ -139,7 +139,7 @@ def from_table(table: Table, units: str | None) -> PenContent:
 
     ``units`` apply to lengths of a file that states none; see `agreed_unit`.
     """
-    table, row_of_units = _without_units(table)
+    table, row_of_units = without_units(table)
     named = [_name_and_unit(column) for column in table.header]
     others = [name for name, _ in named if re.match(_OTHER_COORDINATE, name)]
     if not others and not any(name in ("x", "y", "z") for name, _ in named):
@@ -206,7 +206,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     return (name, unit) if unit or not match[4] else (column, "")
 
 
-def _without_units(table: Table) -> tuple[Table, list[str]]:
+def without_units(table: Table) -> tuple[Table, list[str]]:
     """Return a table without its row of units, and the units; none without one."""
     first = [
         UNIT_NAMES.get(cell.strip("[]() ").casefold(), "") for cell in table.rows[0]

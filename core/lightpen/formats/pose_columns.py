@@ -212,25 +212,20 @@ def _matrix(header: Sequence[str]) -> ToolColumns | None:
     )
 
 
-def rotations_of_quaternions(quaternions: FloatArray) -> FloatArray:
-    """Return rotations (N, 3, 3) of quaternions (N, 4), w x y z; NaN of none."""
+def rotations_of(values: FloatArray) -> FloatArray:
+    """Return rotations (N, 3, 3), NaN of none.
+
+    Of quaternions (N, 4), w x y z, or of rotation vectors (N, 3), rad.
+    """
     from scipy.spatial.transform import Rotation  # takes 0.2 s
 
-    matrices = np.full((len(quaternions), 3, 3), np.nan)
-    good = np.abs(np.linalg.norm(quaternions, axis=1) - 1) < UNIT_TOLERANCE
-    if good.any():
-        turned = np.roll(quaternions[good], -1, axis=1)
-        matrices[good] = Rotation.from_quat(turned).as_matrix()
-    return matrices
-
-
-def rotations_of_vectors(vectors: FloatArray) -> FloatArray:
-    """Return rotations (N, 3, 3) of rotation vectors (N, 3), rad; NaN of none."""
-    from scipy.spatial.transform import Rotation  # takes 0.2 s
-
-    matrices = np.full((len(vectors), 3, 3), np.nan)
-    good = np.isfinite(vectors).all(axis=1)
-    matrices[good] = Rotation.from_rotvec(vectors[good]).as_matrix()
+    matrices = np.full((len(values), 3, 3), np.nan)
+    good = np.isfinite(values).all(axis=1)
+    if values.shape[1] == 4:
+        good &= np.abs(np.linalg.norm(values, axis=1) - 1) < UNIT_TOLERANCE
+        matrices[good] = Rotation.from_quat(np.roll(values[good], -1, 1)).as_matrix()
+    else:
+        matrices[good] = Rotation.from_rotvec(values[good]).as_matrix()
     return matrices
 
 
@@ -275,8 +270,7 @@ def without_names(values: FloatArray, name: str) -> tuple[FloatArray, FloatArray
         elif own.shape[1] == 7:
             for q, t in ((own[:, 3:], own[:, :3]), (own[:, :4], own[:, 4:])):
                 candidates += [
-                    (rotations_of_quaternions(np.roll(q, turn, 1)), t)
-                    for turn in (0, 1)
+                    (rotations_of(np.roll(q, turn, 1)), t) for turn in (0, 1)
                 ]
     good = [each for each in candidates if are_rotations(each[0])]
     if not good:

@@ -18,13 +18,13 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import foreign_program, opened
+from lightpen.formats.pen_tables import without_units
 from lightpen.formats.pose_columns import (
     STATE,
     ToolColumns,
     are_rotations,
     is_lost,
-    rotations_of_quaternions,
-    rotations_of_vectors,
+    rotations_of,
     tools_of,
     without_names,
 )
@@ -81,6 +81,11 @@ def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
     if not table.header:
         values = table.numbers_or_none(range(table.n_columns))
         return _given(*without_names(values, table.name), None, table.name)
+    table, units = without_units(table)
+    if units:
+        named = zip(table.header, units, strict=True)
+        header = tuple(f"{name} [{unit}]" if unit else name for name, unit in named)
+        table = replace(table, header=header)
     tools = tools_of(table)
     if not tools:
         raise FileError(
@@ -108,10 +113,9 @@ def _of_tool(table: Table, columns: ToolColumns, rows: list[int]) -> GivenPoses:
     translations = own.numbers_or_none(columns.translation)
     if columns.matrix:
         rotations = own.numbers_or_none(columns.matrix).reshape(-1, 3, 3)
-    elif columns.vector:
-        rotations = rotations_of_vectors(own.numbers_or_none(columns.vector))
     else:
-        rotations = rotations_of_quaternions(own.numbers_or_none(columns.quaternion))
+        places = columns.vector or columns.quaternion
+        rotations = rotations_of(own.numbers_or_none(places))
     return _given(rotations, translations, columns.unit, table.name)
 
 

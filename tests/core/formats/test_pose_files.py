@@ -126,6 +126,14 @@ def test_the_unit_of_translations_is_that_of_their_names(
     np.testing.assert_allclose(read_poses(path).translations, MOVED, rtol=1e-9)
 
 
+def test_units_may_stand_in_a_row_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "poses.tsv"
+    header = ["qx\tqy\tqz\tqw\ttx\tty\ttz", "-\t-\t-\t-\tcm\tcm\tcm"]
+    path.write_text("\n".join([*header, *rows(QUATERNIONS, MOVED / 10), ""]))
+
+    np.testing.assert_allclose(read_poses(path).translations, MOVED, rtol=1e-9)
+
+
 def test_translations_in_an_unknown_unit_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     path.write_text("tx [ft],ty [ft],tz [ft],qw,qx,qy,qz\n1,2,3,1,0,0,0\n")
