@@ -83,8 +83,8 @@ def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
         return _given(*without_names(values, table.name), None, table.name)
     table, units = without_units(table)
     if units:
-        named = zip(table.header, units, strict=True)
-        header = tuple(f"{name} [{unit}]" if unit else name for name, unit in named)
+        pairs = zip(table.header, units, strict=True)
+        header = tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
         table = replace(table, header=header)
     tools = tools_of(table)
     if not tools:
