@@ -1,7 +1,6 @@
 """``lightpen intrinsics`` and ``lightpen extrinsics``: cameras by views of a board."""
 
 import argparse
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from lightpen.formats.observation_files import pair_images
 from lightpen.formats.own_json import plain
 from lightpen.formats.rig_files import write_camera, write_rig
 from lightpen.local_time import local_now
-from lightpen.messages import printable
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.observing import observe_board, observe_board_of_rig
@@ -33,7 +31,7 @@ from lightpen_extensions.boards.pair import (
 )
 from lightpen_extensions.boards.report import intrinsics_record, intrinsics_text
 
-SIDES = ("left", "right")
+SIDES = ("left", "right")  # names of the cameras
 
 
 def add_intrinsics(parser: argparse.ArgumentParser) -> None:
@@ -76,13 +74,6 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         metavar=("LEFT.yaml", "RIGHT.yaml"),
         help="intrinsics files (default: calibrated from the same images)",
-    )
-    parser.add_argument(
-        "--names",
-        nargs=2,
-        default=SIDES,
-        metavar=("LEFT", "RIGHT"),
-        help="names of the cameras (left right)",
     )
     parser.add_argument(
         "--out",
@@ -146,15 +137,13 @@ def _intrinsics(options: argparse.Namespace) -> None:
 @printing
 def _extrinsics(options: argparse.Namespace) -> None:
     board = parse_board(options.board)
-    names = (options.names[0], options.names[1])
-    _require_names(names)
     sources = [images_at(options.left), images_at(options.right)]
     files = [file for source in sources for file in source.files]
     given = options.cameras or []
     require_other_file(options.json, *files, *given, options.out)
     _require_new_file(options.out, *files, *given)
     cameras = tuple(read_camera(file) for file in given)
-    pairing = pair_images([source.names for source in sources], names)
+    pairing = pair_images([source.names for source in sources], SIDES)
     with progress("Finding the board") as report:
         observed = observe_board_of_rig(sources, pairing, board, report)
     for camera, size, file in zip(
@@ -169,10 +158,10 @@ def _extrinsics(options: argparse.Namespace) -> None:
                 seen_width=size[0],
                 seen_height=size[1],
             )
-    calibration = calibrate_pair(observed.views, names, cameras, options.scale_sigma)
+    calibration = calibrate_pair(observed.views, SIDES, cameras, options.scale_sigma)
     written = list(given)
     if not written:
-        for name, camera in zip(names, calibration.rig.cameras, strict=True):
+        for name, camera in zip(SIDES, calibration.rig.cameras, strict=True):
             file = options.out.with_name(f"{options.out.stem}-{name}.yaml")
             write_camera(
                 replace(
@@ -191,15 +180,6 @@ def _extrinsics(options: argparse.Namespace) -> None:
     if options.json is not None:
         record = pair_record(calibration, observed)
         write_record(options.json, plain(record))
-
-
-def _require_names(names: tuple[str, str]) -> None:
-    """Refuse names that are alike, or that no file can have."""
-    are_plain = all(re.fullmatch(r"[\w.-]+", name) for name in names)
-    if names[0] == names[1] or not are_plain:
-        raise UsageError(
-            "cli.camera-names", one=printable(names[0]), other=printable(names[1])
-        )
 
 
 def _require_new_file(out: Path, *inputs: Path) -> None:
