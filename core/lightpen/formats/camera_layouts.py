@@ -214,6 +214,7 @@ LAYOUTS = (
         fisheye="equidistant fisheye kannalabrandt opencvfisheye",
     ),
 )
+_DISTORTION = r".*(distort\w*|coeff\w*)(?<!model|.type)"  # under whatever name
 COLMAP_MODELS = {
     "SIMPLE_PINHOLE": "f cx cy",
     "PINHOLE": "fx fy cx cy",
@@ -291,7 +292,7 @@ def _given(layout: FileLayout, entries: Entries) -> Given:
     others = layout.of_fisheye if lens is KANNALA_BRANDT else {}
     named = _named(layout.numbers | others, entries)
     pinhole = _pinhole(named, size, layout, entries)
-    if entries.has(*DISTORTION) and not any(name in named for name in _RADIAL.split()):
+    if not any(name in named for name in _RADIAL.split()):
         named |= _usual_distortion(entries, lens)
     if lens is None and any(named.get(name) for name in _RADIAL.split()):
         raise _unread(layout, stated, entries)
@@ -341,9 +342,14 @@ def _named(numbers: dict[str, str], entries: Entries) -> dict[str, float]:
 def _usual_distortion(entries: Entries, lens: LensModel | None) -> dict[str, float]:
     """Return the distortion under a usual name that the layout does not have."""
     names = "k1 k2 k3 k4" if lens is KANNALA_BRANDT else _RADIAL
-    key, value = entries.entry(*DISTORTION)
-    is_mapping = isinstance(value, dict) and "data" not in value
-    found = _named(_each(names, key + "/{}") if is_mapping else {key: names}, entries)
+    if entries.has(*DISTORTION):
+        key, value = entries.entry(*DISTORTION)
+        is_mapping = isinstance(value, dict) and "data" not in value
+        paths = _each(names, key + "/{}") if is_mapping else {key: names}
+    else:
+        is_mapping = any(re.fullmatch(_DISTORTION, key) for key in entries.values)
+        paths = {"radial_distortion": "k1 k2 k3", "tangential_distortion": "p1 p2"}
+    found = _named(paths, entries)
     if is_mapping and not found:
         raise FileError("camera-file.no-distortion", name=entries.name)
     return found

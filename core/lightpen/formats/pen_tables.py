@@ -288,7 +288,7 @@ LISTS = (
     ("marker_positions", "m"),  # rpg_monocular_pose_estimator
     ("TrackedObject/ModelPoints", "m"),  # Rift
     ("lighthouse_config/modelPoints", "m"),  # Vive
-    *(("ModelPoints", ""), ("modelPoints", "m")),
+    ("ModelPoints", "m"),
     *((name, "") for name in ("markers", "MarkerPositions", "points", "leds")),
     *(
         (f"{body}/markers", "")

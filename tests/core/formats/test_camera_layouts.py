@@ -332,6 +332,12 @@ GYROFLOW: dict[str, Any] = {
             id="names and a list of coefficients",
         ),
         pytest.param(
+            dict(zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True))
+            | {"image_size": SIZE, "radial_distortion": BROWN[:2]}
+            | {"tangential_distortion": BROWN[2:]},
+            id="radial and tangential coefficients",
+        ),
+        pytest.param(
             {"stream": without(REALSENSE, "coeffs") | {"distortion": NUMBERS}},
             id="RealSense with coefficients by names",
         ),
@@ -520,6 +526,7 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("<PlusConfiguration><Data>1</Data></PlusConfiguration>", "the entries Data"),
         ({"w": 1280, "h": 720, "K": MATRIX}, "does not state the distortion"),
         ({**REALSENSE, "coeffs": [], "dist": {"a": 1}}, "not state the distortion"),
+        ({**REALSENSE, "coeffs": [], "lens_distortion": [1]}, "not state the distort"),
     ],
 )
 def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> None:
