@@ -46,6 +46,7 @@ CHANGED = 0.1  # of the mean area and contrast of all spots
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
 
+SMALL_AREA = 100.0  # px^2, usual area of LEDs that are searched in every pixel
 HARDLY_AREA = 18.0  # px^2, usual area at which some spots may be too small
 FEWEST_TINY = 4
 FOUND_TINY = 0.75  # of as many tiny ones, that are found where LEDs are large enough
@@ -219,9 +220,11 @@ def _spots_of(
     budget = iter(range(MAX_REGIONS))
     scene = survey(image, mask, stride)
     discs = find_discs(scene, budget, before)
-    # Too few for a pose are worth a closer look.
-    if len(discs.boxes) < MIN_POSE_LEDS and stride > 1:
-        scene = survey(image, mask, stride // 2)
+    # Too few for a pose are worth a closer look, and so small that light joins them.
+    is_few = len(discs.boxes) < MIN_POSE_LEDS
+    if stride > 1 and (is_few or np.median(discs.moments.area) < SMALL_AREA):
+        budget = iter(range(MAX_REGIONS))
+        scene = survey(image, mask, stride // 2 if is_few else 1)
         discs = find_discs(scene, budget)
     has_smears = False
     if len(discs.boxes) < MIN_POSE_LEDS or next(budget, None) is None:
