@@ -222,7 +222,8 @@ def _spots_of(
     discs = find_discs(scene, budget, before)
     # Too few for a pose are worth a closer look, and so small that light joins them.
     is_few = len(discs.boxes) < MIN_POSE_LEDS
-    if stride > 1 and (is_few or np.median(discs.moments.area) < SMALL_AREA):
+    usual_area = 0.0 if is_few else np.median(discs.moments.area)
+    if stride > 1 and (is_few or HARDLY_AREA < usual_area < SMALL_AREA):
         budget = iter(range(MAX_REGIONS))
         scene = survey(image, mask, stride // 2 if is_few else 1)
         discs = find_discs(scene, budget)
@@ -236,7 +237,7 @@ def _spots_of(
     order = np.argsort(-discs.levels.contrast, kind="stable")
     discs = chosen_rows(discs, order[:MAX_SPOTS])
     spots = _as_spots(discs, full_scale, scene.noise, has_smears)
-    usual_area = median(spots.areas.tolist()) if len(spots) else 0.0
+    usual_area = np.median(spots.areas) if len(spots) else 0.0
     if len(spots) < MIN_POSE_LEDS or usual_area < HARDLY_AREA:
         spots = replace(spots, tiny_width=_tiny_width(scene, spots, full_scale))
     if len(spots) and usual_area < np.pi * LARGEST_RADIUS**2:

@@ -83,8 +83,10 @@ def damaged_image(name: str | Message) -> FileError:
 def _unknown_image(start: bytes, name: str | Message) -> FileError:
     """Return the error of a file that is of another kind, or damaged."""
     kind = kind_of(start)
+    if not kind:
+        return FileError("image.unknown", name=name)
     known = FileError("image.kind", name=name, kind=kind)
-    return known if kind and kind != AN_IMAGE else damaged_image(name)
+    return damaged_image(name) if kind == AN_IMAGE else known
 
 
 def cut_off_image(name: str | Message) -> FileError:

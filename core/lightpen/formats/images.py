@@ -227,6 +227,7 @@ SUFFIXES = (
 VIDEO_SUFFIXES = (
     *(".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm"),
     *(".mjpeg", ".mjpg", ".ts", ".mts", ".m2ts", ".wmv", ".flv", ".y4m", ".3gp"),
+    *(".ogv", ".mxf", ".vob", ".f4v"),
 )
 IMAGE_FOLDER = "images"
 IN_FLIGHT = 4  # images per thread that may wait in memory

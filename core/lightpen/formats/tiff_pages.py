@@ -46,7 +46,7 @@ _KEPT = (
 _READ = frozenset(
     (*_KEPT, _KIND, _STRIPS, _STRIP_SIZES, _TILES, _TILE_SIZES, _ORIENTATION, _FORMAT)
 )
-_FORMS = {1: "uint", 2: "int", 3: "float", 4: "uint"}  # _FORMAT
+_FORMS = {1: "uint", 2: "int", 3: "float", 4: "uint", 6: "complex"}  # _FORMAT
 _REDUCED, _MASK = 1, 4  # bits of _KIND
 _MIN_IS_WHITE, _MIN_IS_BLACK, _MOSAIC = 0, 1, 32803
 _LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits

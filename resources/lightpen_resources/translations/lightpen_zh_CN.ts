@@ -6160,6 +6160,10 @@
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
     </message>
     <message>
+        <source>{name} is not a supported image (PNG, JPEG, BMP, TIFF, PGM, WebP). Save the images as PNG or TIFF, or copy it again.</source>
+        <translation>{name} 不是支持的图像（PNG、JPEG、BMP、TIFF、PGM、WebP）。请将图像保存为 PNG 或 TIFF，或重新复制。</translation>
+    </message>
+    <message>
         <source>{name} is the raw image of a colour camera: its pixels repeat the pattern of a Bayer filter, which moves the centres of LEDs. Save the images in colour (demosaiced) or grey, or use a monochrome camera.</source>
         <translation>{name} 是彩色相机的原始图像：像素重复拜耳滤光片的图案，会使 LED 中心偏移。请保存为彩色图像（已去马赛克）或灰度图像，或使用黑白相机。</translation>
     </message>

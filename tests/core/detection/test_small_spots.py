@@ -76,6 +76,23 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
     assert np.mean(flaws > 0) <= 0.1
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_small_leds_that_wide_light_joins_are_found_in_large_images(seed: int) -> None:
+    # In every fourth pixel a fifth of them is lost.
+    panel = replace(CLEAN, halos=(0.02, 0.1), pitch=6.0)
+    shown = panel_image(panel, np.random.default_rng(seed))
+    image = np.full((1100, 1400), 8, np.uint8)
+    height, width = shown.image.shape
+    image[200 : 200 + height, 300 : 300 + width] = np.maximum(shown.image, 8)
+    wide = cv2.GaussianBlur(image, (0, 0), 9.0)
+
+    spots = detect_spots(cv2.addWeighted(image, 1.0, wide, 6.0, 0.0).astype(np.uint8))
+
+    places = shown.centers + np.array([300, 200])
+    gaps = np.linalg.norm(spots.centers - places[:, None], axis=2)
+    assert np.mean(gaps.min(axis=1) < 2.0) > 0.95
+
+
 @pytest.mark.slow
 def test_leds_that_all_differ_by_halo_and_lens_are_not_flagged_for_it() -> None:
     # A fixed limit of their difference flags a quarter.

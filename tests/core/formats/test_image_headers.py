@@ -71,7 +71,7 @@ def test_a_header_that_ends_early_is_damaged(name: str) -> None:
 
 
 def test_a_format_whose_size_is_not_known_here_is_refused() -> None:
-    with pytest.raises(FileError, match="not a supported image"):
+    with pytest.raises(FileError, match="Save the images as PNG or TIFF, or copy it"):
         header_of(b"not an image at all")
 
 
@@ -91,6 +91,8 @@ def test_a_format_whose_size_is_not_known_here_is_refused() -> None:
         (b"Pf\n4 4\n-1.0\n" + bytes(64), "PFM"),
         (b"P7\nWIDTH 4\n" + bytes(64), "PAM"),
         (b"\x1a\x45\xdf\xa3" + bytes(100), "video"),
+        (b"SDPX" + bytes(100), "DPX"),
+        (bytes(257) + b"ustar" + bytes(100), "archive"),
     ],
 )
 def test_a_file_of_images_of_another_kind_is_named(data: bytes, kind: str) -> None:
