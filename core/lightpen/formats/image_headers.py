@@ -16,6 +16,7 @@ from lightpen.formats.files import AN_IMAGE, HEAD, kind_of
 from lightpen.messages import Message
 
 MAX_PIXELS = 70_000_000  # the largest usual sensors have 9344 x 7000
+SHORTEST_IMAGE = 16  # bytes; any format can be told from as many
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 _PNM_GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
@@ -83,6 +84,8 @@ def damaged_image(name: str | Message) -> FileError:
 def _unknown_image(start: bytes, name: str | Message) -> FileError:
     """Return the error of a file that is of another kind, or damaged."""
     kind = kind_of(start)
+    if len(start) < SHORTEST_IMAGE:
+        return cut_off_image(name)
     if not kind:
         return FileError("image.unknown", name=name)
     known = FileError("image.kind", name=name, kind=kind)
