@@ -154,18 +154,11 @@ def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
     )
     if noise is None:
         return bundle.covariance
-    by_images, tip = _by_images(bundle), bundle.effective[:3]
-    factor = float(
-        np.trace(noise.covariance[:3, :3]) / np.trace(tip @ by_images @ tip.T)
-    )
-    return np.asarray(bundle.covariance + (factor - 1) * by_images)
-
-
-def _by_images(bundle: Bundle) -> FloatArray:
-    """Return the covariance (p, p) by independent noise with which LEDs are weighed."""
-    covariance = bundle.covariance
-    information = bundle.information - bundle.jitter_information
-    return np.asarray(covariance @ information @ covariance)
+    covariance, tip = bundle.covariance, bundle.effective[:3]
+    images = bundle.information - bundle.jitter_information
+    by_images = covariance @ images @ covariance
+    factor = np.trace(noise.covariance[:3, :3]) / np.trace(tip @ by_images @ tip.T)
+    return np.asarray(covariance + (float(factor) - 1) * by_images)
 
 
 def instrument_mixing(bundle: Bundle) -> FloatArray:
