@@ -10,7 +10,7 @@ from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
-from lightpen_app.steps.start.library_control import EntryPresenter, LibraryControl
+from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.setup_view import SetupView, WelcomeView
@@ -37,7 +37,7 @@ class StartPage(ResponsiveLayout, Page):
         # Widgets: the order of making them is the order of the Tab key
         self._unknown_code = QuestionBar()
         self._unfinished = InterruptedPanel(
-            workbench, services, lambda: self._entries.settle()
+            workbench, services, lambda: self._setup.settle()
         )
         self._day = DayView(workbench, services)
         is_known = bool(workbench.selection.stations())
@@ -47,9 +47,6 @@ class StartPage(ResponsiveLayout, Page):
         self._views = QStackedWidget()
         self._all_limits = LimitsControl(workbench, self)
         self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
-        self._entries = EntryPresenter(
-            self._selection, self._library, setup.names, setup.limits, setup.assumed
-        )
 
         # Layout
         bars = self._unknown_code, self._unfinished
@@ -62,6 +59,7 @@ class StartPage(ResponsiveLayout, Page):
         self._views.setCurrentIndex(SETUP if is_known else WELCOME)
 
         # Connections
+        setup.edited.connect(self._show_entries)
         setup.names.station_entered.connect(self.show_missing_input)
         setup.limits.all_requested.connect(self._all_limits.open)
         setup.welcome_requested.connect(self.show_welcome)
@@ -74,9 +72,10 @@ class StartPage(ResponsiveLayout, Page):
         self._day.changed.connect(self.changed)
         self._day.step_requested.connect(self.step_requested)
         self._day.code_entered.connect(self._library.take_code)
-        self._entries.edited.connect(self._show_entries)
+        self._library.chosen.connect(setup.choose_item)
+        self._unknown_code.declined.connect(setup.ask_for_tip_again)
         self._unfinished.step_requested.connect(self.step_requested)
-        self._last.verification_requested.connect(self._entries.settle)
+        self._last.verification_requested.connect(self._setup.settle)
         self._last.verification_requested.connect(lambda: show(verify))
         workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
         workbench.library.changed.connect(self._show_entries)
@@ -107,11 +106,11 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def is_complete(self) -> bool:
-        return not self._entries.why_not_on()
+        return not self._setup.why_not_on()
 
     @override
     def main_action(self) -> MainAction:
-        why_not = self._entries.why_not_on()
+        why_not = self._setup.why_not_on()
         if self._shows(WELCOME):
             why_not = self.tr("Choose how to begin.")
         if not self.is_day:
@@ -121,7 +120,7 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def run_main_action(self) -> None:
-        self._entries.settle()
+        self._setup.settle()
         if self.is_day:
             self._day.run_main_action()
         else:
@@ -132,7 +131,7 @@ class StartPage(ResponsiveLayout, Page):
         if self._shows(WELCOME):
             self._welcome.first.setFocus()
             return
-        if self._entries.typed().start_missing_inputs():
+        if self._setup.typed().start_missing_inputs():
             self.show_setup()
 
     @override
@@ -146,15 +145,15 @@ class StartPage(ResponsiveLayout, Page):
         self._setup.names.set_stations(self._selection.stations())
         self._tips.refresh()
         self._last.look_up()
-        if not self._entries.typed().start_missing_inputs():
+        if not self._setup.typed().start_missing_inputs():
             self.show_day()
         self._day.start()
 
     @override
     def left(self) -> None:
         self._day.stop()
-        self._entries.settle()
-        self._entries.forget_typed()
+        self._setup.settle()
+        self._setup.forget_typed()
 
     @override
     def shut_down(self) -> None:
@@ -169,7 +168,7 @@ class StartPage(ResponsiveLayout, Page):
     def show_setup(self) -> None:
         """Show the settings page."""
         self._views.setCurrentIndex(SETUP)
-        missing = self._entries.typed().start_missing_inputs()
+        missing = self._setup.typed().start_missing_inputs()
         first = missing[0] if missing else MissingInput.STATION
         if first not in (MissingInput.PEN, MissingInput.TIP):
             self._setup.set_more(True)
@@ -207,7 +206,7 @@ class StartPage(ResponsiveLayout, Page):
         self._show_entries()
 
     def _show_entries(self) -> None:
-        self._setup.set_why_not_done(self._entries.why_not_on())
+        self._setup.set_why_not_done(self._setup.why_not_on())
         self.changed.emit()
 
     def _on_selected(self, before: Preparation) -> None:

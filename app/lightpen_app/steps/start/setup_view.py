@@ -1,24 +1,27 @@
 """The first view of a new user, and the set-up of a station."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from string import Template
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.arrays import FloatArray
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.swing.preparation import NO_SOURCE, Preparation, SourceChoice, SourceKind
 from lightpen_app.look.layouts import (
     fill,
     horizontal_layout,
     set_stacked,
     vertical_layout,
 )
+from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.signs import draw_svg
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
-from lightpen_app.look.words import breakable
+from lightpen_app.look.words import breakable, shortened
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog
 from lightpen_app.widgets.controls import PushButton, open_folder
@@ -88,21 +91,30 @@ class DataFolderPanel(Translated, QGroupBox):
         self._doubt.set_value(doubt if self._fault else StatusMessage())
 
 
-class SetupView(Translated, QWidget):
-    """Setup of a station."""
+TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
+
+class SetupView(Translated, QWidget):
+    """Setup of a station: fills the fields from the selection and applies entries."""
+
+    edited = Signal()  # something is being typed; it may be unfinished
     done = Signal()  # show the day page
     welcome_requested = Signal()  # show how to begin
 
     def __init__(self, workbench: Workbench, *, is_known: bool) -> None:
         super().__init__()
+        self._selection, self._watch = workbench.selection, workbench.library
+        self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
+        # Typed here, perhaps before the name of the tip: for a tip that is not known
+        self._ball: float | None = None
+        self._nominal_tip: FloatArray | None = None
 
         # Widgets: the order of making them is the order of the Tab key
         self.names, self.limits = NamesForm(), LimitsForm()
-        self.assumed = AssumptionsDialog(self)
+        self._assumed = AssumptionsDialog(self)
         self._assumptions = self.make_button(
             self.tr("Default uncertainties..."),
-            self.assumed.open,
+            self._assumed.open,
             tip=self.tr(
                 "Focal length, scale, temperature, form of ball and cone: "
                 "uncertainty where no file states it."
@@ -136,8 +148,19 @@ class SetupView(Translated, QWidget):
 
         # Connections
         self._more.toggled.connect(self.set_more)
+        self.names.value_edited.connect(self._on_edited)
+        self.names.value_changed.connect(self._take_names)
+        self.names.item_chosen.connect(self.choose_item)
+        self.names.ball_entered.connect(self._on_ball_entered)
+        self.names.station_changed.connect(self._on_station_changed)
+        self.names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
+        self.limits.value_changed.connect(self._on_limits_changed)
+        self._assumed.value_changed.connect(self._on_assumed_changed)
+        self._typing.timeout.connect(self._take_names)
+        self._selection.changed.connect(self._on_selected)
 
         self.set_more(is_known)
+        self._show_selected(self._selection.preparation)
 
     def lead(self) -> str:
         """Return what to enter."""
@@ -159,6 +182,135 @@ class SetupView(Translated, QWidget):
     def set_why_not_done(self, why_not: str) -> None:
         """Show the missing inputs of the day page."""
         self._done.set_why_not(why_not)
+
+    def typed(self) -> Preparation:
+        """Return the selection with the names being typed."""
+        return replace(self._selection.preparation, names=self.names.value())
+
+    def why_not_on(self) -> str:
+        """Return the missing input, or that the tip is retired."""
+        typed = self.typed()
+        missing = typed.start_missing_inputs()
+        tip = self._watch.library.tip(typed.names.tip)
+        if missing:
+            return missing_input_text(missing[0])
+        if tip is None or not tip.is_retired:
+            return ""
+        return self.tr(
+            "Tip {0} is retired. Choose another tip, or reactivate it in the tip "
+            "library."
+        ).format(shortened(tip.id))
+
+    def _on_edited(self) -> None:
+        self._typing.start()
+        self.edited.emit()
+
+    def _take_names(self) -> None:
+        """Apply all names but the station's, which may be incomplete."""
+        self._typing.stop()
+        now = self._selection.preparation
+        names = replace(self.names.value(), station=now.names.station)
+        if names == now.names:
+            return
+        renamed, listed = now.renamed(names), self._watch.library.tip(names.tip)
+        if names.tip != now.names.tip:
+            ball = renamed.names.ball_diameter or self._ball
+            point = self._nominal_tip
+            point = point if renamed.nominal_tip is None else renamed.nominal_tip
+            names = replace(renamed.names, ball_diameter=ball)
+            renamed = replace(renamed, names=names, nominal_tip=point)
+            if listed is not None:
+                renamed = renamed.with_listed(listed)
+        self._selection.set_preparation(renamed)
+
+    def _on_ball_entered(self, ball: float) -> None:
+        self._ball = ball or None
+        self._take_names()
+
+    def forget_typed(self) -> None:
+        """Keep what was typed for the tip that is chosen from another tip."""
+        self._ball = self._nominal_tip = None
+
+    def choose_item(self, kind: ItemKind, name: str) -> None:
+        """Apply a selected pen, tip or cone; a tip with its properties."""
+        self._take_names()
+        now = self._selection.preparation
+        tip = self._watch.library.tip(name)
+        if kind is ItemKind.TIP and tip is not None:
+            self.forget_typed()
+            self._selection.set_preparation(now.with_listed(tip))
+        elif kind is ItemKind.PEN:
+            names = replace(now.names, pen=name)
+            self._selection.set_preparation(replace(now, names=names))
+        else:
+            names = replace(now.names, cone=name)
+            self._selection.set_preparation(replace(now, names=names))
+
+    def ask_for_tip_again(self) -> None:
+        """Ask for the tip again: the code belongs to another one."""
+        self._take_names()
+        now = self._selection.preparation
+        self._selection.set_preparation(now.renamed(replace(now.names, tip="")))
+
+    def _on_station_changed(self, name: str) -> None:
+        """Bring back a known station; a new one takes over the present choices."""
+        self._take_names()
+        now = self._selection.preparation
+        if name in self._selection.stations():
+            self._selection.choose_station(name)
+        else:
+            if now.names.station and now.source.kind == SourceKind.SIMULATED:
+                now = now.with_source(NO_SOURCE)  # only the station before simulates
+            now = replace(now, names=replace(now.names, station=name))
+            self._selection.set_preparation(now)
+        self.names.set_stations(self._selection.stations())
+
+    def _on_nominal_tip_changed(self) -> None:
+        now, point = self._selection.preparation, self.names.nominal_tip()
+        self._nominal_tip = point
+        self._selection.set_preparation(replace(now, nominal_tip=point))
+
+    def _on_limits_changed(self) -> None:
+        now, limits = self._selection.preparation, self.limits.value()
+        self._selection.set_preparation(replace(now, limits=limits))
+
+    def _on_assumed_changed(self) -> None:
+        now, assumed = self._selection.preparation, self._assumed.value()
+        self._selection.set_preparation(now.with_assumptions(assumed))
+
+    def settle(self) -> None:
+        """Apply pending input."""
+        self.names.settle()
+        self.limits.settle()
+        self._take_names()
+        station = self.names.value().station
+        if station != self._selection.preparation.names.station:
+            self._on_station_changed(station)
+
+    def _on_selected(self, before: Preparation) -> None:
+        now = self._selection.preparation
+        if now.names.tip not in (before.names.tip, self.names.value().tip):
+            self.forget_typed()  # another was chosen elsewhere
+        self._show_selected(now, before)
+
+    def _show_selected(
+        self, now: Preparation, before: Preparation | None = None
+    ) -> None:
+        """Update the fields that differ; others may be in use."""
+        if before is None or now.names != before.names:
+            self.names.set_value(now.names, None if before is None else before.names)
+        if before is None or now.names.station != before.names.station:
+            self.names.set_stations(self._selection.stations())
+        if now.limits != self.limits.value():
+            self.limits.set_value(now.limits)
+        self.limits.set_guarded(self._selection.supervision.is_guarded)
+        if now.assumptions_today != self._assumed.value():
+            self._assumed.set_value(now.assumptions_today)
+        if before is None or now.nominal_tip is not before.nominal_tip:
+            self.names.set_nominal_tip(now.nominal_tip)
+        if before is None or now.pen_file is not before.pen_file:
+            pen = None if now.pen_file is None else now.pen_file.pen
+            self.names.set_tip_of_file(None if pen is None else pen.nominal_tip)
 
 
 LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture

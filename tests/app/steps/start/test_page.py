@@ -48,9 +48,9 @@ from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.start.day_view import DayView, TemperatureField
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
-from lightpen_app.steps.start.library_control import TYPING_PAUSE_MS
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
+from lightpen_app.steps.start.setup_view import TYPING_PAUSE_MS
 from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import SignLabel
