@@ -96,11 +96,12 @@ class CrashHook(QObject):
 
     def _write(self, text: str, number: int) -> str:
         now = local_now()
+        log = "\n".join(("The last lines of the log:", *recent_lines(), ""))
         path = self._folder / f"crash-{now:%Y%m%d-%H%M%S}-{number}.txt"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             path.write_text(
-                _without_home(f"{_circumstances(now)}\n\n{text}\n{_log()}"),
+                _without_home(f"{_circumstances(now)}\n\n{text}\n{log}"),
                 encoding="utf-8",
                 errors="backslashreplace",
             )
@@ -139,7 +140,3 @@ def _circumstances(now: datetime) -> str:
     lines.extend(f"{name}: {number}" for name, number in versions().items())
     lines.append(f"thread: {threading.current_thread().name}")
     return "\n".join(lines)
-
-
-def _log() -> str:
-    return "\n".join(("The last lines of the log:", *recent_lines(), ""))

@@ -123,11 +123,6 @@ class Report:
 FILE_LIST = "files.sha256"
 
 
-def file_list() -> Path:
-    """Return the path of the file list of the installer, if it was used."""
-    return Path(sys.prefix).parent / FILE_LIST
-
-
 def damaged_files(files: Path) -> tuple[str, ...]:
     """Return the files of a list that are missing, or not as they were built."""
     lines = files.read_text(encoding="utf-8").splitlines()
@@ -209,7 +204,7 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
 
 
 def _checked_files() -> str:
-    files = file_list()
+    files = Path(sys.prefix).parent / FILE_LIST  # of the installer, if it was used
     if not files.is_file():
         return "not put here by an installer: no list to check them by"
     damaged = damaged_files(files)

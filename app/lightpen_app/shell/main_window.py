@@ -427,7 +427,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _show_options(self) -> None:
         menu = self._options
-        corner = self._sidebar.options_corner()
+        corner = self._sidebar.options.mapToGlobal(QPoint(0, 0))
         menu.popup(corner - QPoint(0, menu.sizeHint().height()))
 
     def _on_step_chosen(self, index: int) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
-from PySide6.QtCore import QPoint, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QLabel, QWidget
 from typing_extensions import override
 
@@ -317,10 +317,6 @@ class Sidebar(Translated, QFrame):
         self._name.setVisible(not room.is_low)  # the title of the window shows it
         self._steps.set_narrow(narrow)
         self._refresh()
-
-    def options_corner(self) -> QPoint:
-        """Return the screen position of the top left of the options button."""
-        return self.options.mapToGlobal(QPoint(0, 0))
 
     def _refresh(self) -> None:
         self._show_subject()

@@ -50,7 +50,8 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
             return None
         line, ticks, words = specs
         if self.logMode:
-            words = sorted(words, key=_is_between_decades)
+            # Powers of ten are drawn first.
+            words = sorted(words, key=lambda spec: spec[2].strip("0.") != "1")
         free: list[TextSpec] = []
         for each in words:
             if each[2] and not any(each[0].intersects(other[0]) for other in free):
@@ -74,11 +75,6 @@ def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:
         return words
     n = max((len(text.partition(".")[2]) for _, _, text in words), default=0)
     return [(place, flags, number_text(float(text), n)) for place, flags, text in words]
-
-
-def _is_between_decades(spec: TextSpec) -> bool:
-    """Return whether a number is no power of ten; they are drawn first."""
-    return spec[2].strip("0.") != "1"
 
 
 class Canvas(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types

@@ -74,7 +74,8 @@ def save(file: Path, content: Content, changes: Changes) -> Message | None:
             write_whole(file, json.dumps(content, ensure_ascii=True, indent=1).encode())
             sync_folder(file.parent)
     except OSError as error:
-        raise _cannot_be_saved(file, error) from error
+        reason = strerror(error)
+        raise FileError("settings.unwritable", file=file, reason=reason) from error
     return fault
 
 
@@ -91,7 +92,3 @@ def _set_aside(file: Path) -> Message:
 
 def _held(file: Path) -> Message:
     return message("settings.held", file=file, seconds=PATIENCE)
-
-
-def _cannot_be_saved(file: Path, error: OSError) -> FileError:
-    return FileError("settings.unwritable", file=file, reason=strerror(error))

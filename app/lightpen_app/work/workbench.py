@@ -64,10 +64,7 @@ class ArchiveWriter(QObject):
             logbook.enter_owed()
 
         job = Job(keep, self)
-        job.start(failed=self._on_failed)
-
-    def _on_failed(self, why: str) -> None:
-        self._notifications.notify(self, why)
+        job.start(failed=lambda why: self._notifications.notify(self, why))
 
 
 LOOKING_MS = 5000  # from one look to the next
@@ -103,10 +100,7 @@ class FolderWatch(QObject):
     def _check(self) -> None:
         folder = self._folder
         job = Job(lambda _: check_writable(folder), self)
-        job.start(self._on_writable, self._set_fault)
-
-    def _on_writable(self, _: None) -> None:
-        self._set_fault("")
+        job.start(lambda _: self._set_fault(""), self._set_fault)
 
     def _set_fault(self, fault: str) -> None:
         if fault != self._fault:
@@ -230,14 +224,14 @@ class Workbench(QObject):
     def _read_supervision(self) -> None:
         folder = self.folder
         job = Job(lambda _: read_supervision(folder), self)
-        job.start(self._on_supervision_read, self._on_supervision_unread)
+        job.start(
+            self._on_supervision_read,
+            lambda why: self.notifications.notify("supervision", why),
+        )
 
     def _on_supervision_read(self, supervision: Supervision) -> None:
         if supervision.is_guarded:
             self.selection.set_supervision(supervision)
-
-    def _on_supervision_unread(self, why: str) -> None:
-        self.notifications.notify("supervision", why)
 
     def _on_settings_failed(self, why: Message) -> None:
         self.notifications.notify(SETTINGS, worded(why))

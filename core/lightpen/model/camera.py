@@ -251,7 +251,7 @@ class Camera:
                 focal_points[..., None] * fisheye.gain_jacobian(r2)[..., None, :]
             )
             return J
-        k4, k5, k6 = _rational(self.distortion)
+        k4, k5, k6 = self.distortion[5:8] if len(self.distortion) == 8 else (0, 0, 0)
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         p1, p2 = self.distortion[2:4]
         J[..., 0, 0] = x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
@@ -389,10 +389,6 @@ class Camera:
             lens_field=field,
             found=None,
         )
-
-
-def _rational(distortion: FloatArray) -> FloatArray:
-    return distortion[5:8] if len(distortion) == 8 else np.zeros(3)
 
 
 def _radial_gain(distortion: FloatArray, r2: FloatArray) -> FloatArray:

@@ -109,10 +109,6 @@ def export_remark(file: CalibrationFile) -> str:
     )
 
 
-def _json(file: CalibrationFile) -> str:
-    return record_bytes(file.calibration).decode()
-
-
 def _tip(file: CalibrationFile) -> str:
     """Return a table of one row: names, origin, tip and U (k = 2), time and grade."""
     calibration = file.calibration
@@ -167,7 +163,7 @@ TABLE_FORMATS = (
         "json",
         message("export.json"),
         "_calibration.json",
-        _json,
+        lambda file: record_bytes(file.calibration).decode(),
         message("content.json"),
         has_status=False,
     ),

@@ -3700,6 +3700,10 @@
         <source>Other ways to begin</source>
         <translation>其他开始方式</translation>
     </message>
+    <message>
+        <source>Tip {0} is retired. Choose another tip, or reactivate it in the tip library.</source>
+        <translation>测头 {0} 已停用。请另选一个，或在测头库中恢复使用。</translation>
+    </message>
 </context>
 <context>
     <name>Sidebar</name>
@@ -3868,10 +3872,6 @@
     <message>
         <source>Choose how to begin.</source>
         <translation>请选择如何开始。</translation>
-    </message>
-    <message>
-        <source>Tip {0} is retired. Choose another tip, or reactivate it in the tip library.</source>
-        <translation>测头 {0} 已停用。请另选一个，或在测头库中恢复使用。</translation>
     </message>
     <message>
         <source>Continue to the camera</source>

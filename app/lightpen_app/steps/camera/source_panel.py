@@ -44,7 +44,7 @@ class DeviceField(ChoiceField):
         self.setCompleter(None)  # type: ignore[arg-type] # Qt takes it away by this
 
         # Connections
-        self.activated.connect(self._on_activated)
+        self.activated.connect(lambda at: self._take(str(self.itemData(at))))
         edit.returnPressed.connect(self._on_return_pressed)
 
     def set_value(self, value: str) -> None:
@@ -66,9 +66,6 @@ class DeviceField(ChoiceField):
     def set_faulty(self, faulty: bool) -> None:
         """Mark the camera as one that cannot be opened."""
         set_tone(self.edit, Tone.BAD if faulty else Tone.PLAIN)
-
-    def _on_activated(self, index: int) -> None:
-        self._take(str(self.itemData(index)))
 
     def _on_return_pressed(self) -> None:
         text = self.currentText().strip()
@@ -171,7 +168,7 @@ class SourcePanel(Translated, QGroupBox):
         self._producer.value_changed.connect(self._on_producer_changed)
         self._folder.triggered.connect(self._on_folder_triggered)
         self._file.triggered.connect(self._on_file_triggered)
-        self._use_found.clicked.connect(self._on_use_found_clicked)
+        self._use_found.clicked.connect(lambda: self.files_requested.emit(self._beside))
         FileDrops(self).dropped.connect(self._on_dropped)
 
         self.set_faulty(False)
@@ -290,9 +287,6 @@ class SourcePanel(Translated, QGroupBox):
             self.tr("GenTL producer of the camera"),
             self.tr("GenTL producers ({0})").format("*.cti"),
         )
-
-    def _on_use_found_clicked(self) -> None:
-        self.files_requested.emit(self._beside)
 
     def _on_dropped(self, path: str) -> None:
         """Take images that are dropped here, whatever the source was."""

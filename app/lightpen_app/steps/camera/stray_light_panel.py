@@ -37,7 +37,9 @@ class StrayLightPanel(Translated, QGroupBox):
         )
         self._start = self.make_button(self.tr("Search"), self._on_start_clicked)
         self._mask = PushButton()
-        self._clear = self.make_button(self.tr("Clear mask"), self._on_clear_clicked)
+        self._clear = self.make_button(
+            self.tr("Clear mask"), lambda: self._set_mask(np.zeros((0, 3)))
+        )
         self._outcome = SignLabel()
 
         # Layout
@@ -117,9 +119,6 @@ class StrayLightPanel(Translated, QGroupBox):
         circles = self._found
         self.give_up()
         self._set_mask(np.concatenate([self._masked, circles]))
-
-    def _on_clear_clicked(self) -> None:
-        self._set_mask(np.zeros((0, 3)))
 
     def _refresh(self) -> None:
         n_found = len(self._found)

@@ -258,15 +258,14 @@ class MethodsPanel(PlotsPanel):
         fill(self._layout, self._table, self._reports, (QWidget(), 10))
 
         # Connections
-        self._reports.clicked.connect(self._on_reports_clicked)
+        self._reports.clicked.connect(
+            lambda is_on: self.method_chosen.emit("two-stage" if is_on else "joint")
+        )
 
     def set_locked(self, why: str) -> None:
         """Set why the method cannot be changed; empty if it can."""
         self._reports.setEnabled(not why)
         set_tooltip(self._reports, why or self.tr("Also for later swings here"))
-
-    def _on_reports_clicked(self, is_on: bool) -> None:
-        self.method_chosen.emit("two-stage" if is_on else "joint")
 
     @override
     def _show(self, solution: Solution) -> None:
@@ -293,11 +292,7 @@ class MethodsPanel(PlotsPanel):
         )
         columns = (*(f"{axis} / mm" for axis in AXES), self.tr("RMS / mm"))
         cells = tuple(
-            (*_rounded(values[:3]), "" if rms is None else mm_text(rms))
+            (*map(mm_text, values[:3].tolist()), "" if rms is None else mm_text(rms))
             for _, values, rms in rows
         )
         return Figures(columns, tuple(name for name, *_ in rows), cells)
-
-
-def _rounded(values: FloatArray) -> tuple[str, ...]:
-    return tuple(map(mm_text, values.tolist()))

@@ -6,9 +6,8 @@ from functools import partial
 from operator import attrgetter
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QShortcut
 from PySide6.QtWidgets import QGridLayout, QGroupBox, QLineEdit, QWidget
-from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.limits import LEAST_IMAGES, MOST_IMAGES, SwingLimits
@@ -58,10 +57,10 @@ class NamesForm(Translated, QWidget):
         )
         self._operator = QLineEdit(maxLength=LONGEST_NAME)
         self._probe = self.say(QGroupBox(), self.tr("Item under calibration"))
-        self._pen = _ListedEdit()
-        self._tip = _ListedEdit()
+        self._pen = QLineEdit(maxLength=LONGEST_NAME)
+        self._tip = QLineEdit(maxLength=LONGEST_NAME)
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
-        self._cone = _ListedEdit()
+        self._cone = QLineEdit(maxLength=LONGEST_NAME)
         self._nominal_tip = PointField()
         self._lists = {kind: ItemButton() for kind in SWUNG}
         self._edits = (self._operator, self._pen, self._tip, self._cone)
@@ -91,7 +90,8 @@ class NamesForm(Translated, QWidget):
             horizontal_layout(column, (edit, 1), button, spacing=GRID // 2)
             button.chosen.connect(partial(self.item_chosen.emit, kind))
             button.library_requested.connect(partial(self.library_requested.emit, kind))
-            edit.list_requested.connect(button.showMenu)
+            down = QShortcut(Qt.Key.Key_Down, edit, button.showMenu)
+            down.setContext(Qt.ShortcutContext.WidgetShortcut)
         ball, unknown = self.tr("Ball diameter"), self.tr("Not specified")
         self.make_field(probe, self._ball, ball, hint=unknown, at=(1, 1))
         add_labelled(probe, self._nominal_label, self._nominal_tip, at=(2, 0, 1, 2))
@@ -204,35 +204,23 @@ class LimitsForm(Translated, QGroupBox):
         # Layout
         layout = _panel(self)
         layout.setColumnStretch(2, 1)
-        self.make_field(
-            layout,
-            self._uncertainty,
-            self.tr("Max. expanded uncertainty U (k = 2)"),
-            tip=self.tr(
-                "The swing ends when U of the tip along its weakest direction is "
-                "within this limit. Default: {0} mm."
-            ).format(f"{SwingLimits.max_uncertainty:g}"),
-        )
-        self.make_field(
-            layout,
-            self._least,
-            self.tr("Min. images"),
-            tip=self.tr(
-                "The swing does not end with fewer images. Not above the maximum. "
-                "Default: {0}."
-            ).format(SwingLimits.min_images),
-            at=(0, 1),
-        )
-        self.make_field(
-            layout,
-            self._most,
-            self.tr("Max. images"),
-            tip=self.tr(
-                "The swing ends at this number of images. Not below the minimum. "
-                "Default: {0}."
-            ).format(SwingLimits.max_images),
-            at=(0, 2),
-        )
+        u = self.tr("Max. expanded uncertainty U (k = 2)")
+        least, most = self.tr("Min. images"), self.tr("Max. images")
+        ends = self.tr(
+            "The swing ends when U of the tip along its weakest direction is "
+            "within this limit. Default: {0} mm."
+        ).format(f"{SwingLimits.max_uncertainty:g}")
+        not_fewer = self.tr(
+            "The swing does not end with fewer images. Not above the maximum. "
+            "Default: {0}."
+        ).format(SwingLimits.min_images)
+        not_more = self.tr(
+            "The swing ends at this number of images. Not below the minimum. "
+            "Default: {0}."
+        ).format(SwingLimits.max_images)
+        self.make_field(layout, self._uncertainty, u, tip=ends)
+        self.make_field(layout, self._least, least, tip=not_fewer, at=(0, 1))
+        self.make_field(layout, self._most, most, tip=not_more, at=(0, 2))
         layout.addWidget(self._all, 0, 3, Qt.AlignmentFlag.AlignBottom)
 
         # Connections
@@ -279,23 +267,6 @@ class LimitsForm(Translated, QGroupBox):
     def _on_most_changed(self, most: float) -> None:
         self._least.set_limits(LEAST_IMAGES, most)
         self.value_changed.emit()
-
-
-class _ListedEdit(QLineEdit):
-    """A name with a list opened by an arrow key."""
-
-    list_requested = Signal()
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setMaxLength(LONGEST_NAME)
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Down:
-            self.list_requested.emit()
-        else:
-            super().keyPressEvent(event)
 
 
 def _panel(group: QGroupBox) -> QGridLayout:

@@ -48,7 +48,7 @@ class LibraryControl(QObject):
         # Connections
         self._watch.changed.connect(self.refresh)
         names.library_requested.connect(self.open)
-        question.agreed.connect(self._on_agreed)
+        question.agreed.connect(lambda: self.open().add(self._unknown, ItemKind.TIP))
 
         question.set_words(self._asking)
 
@@ -116,9 +116,6 @@ class LibraryControl(QObject):
         words = self.tr("Tip {0} is not in the tip library. Add it?")
         asked = words.format(shortened(self._unknown))
         return Question(asked, self.tr("Add tip"), self.tr("Not now"))
-
-    def _on_agreed(self) -> None:
-        self.open().add(self._unknown, ItemKind.TIP)
 
     def _on_change_asked(self, asked: RequestedChange) -> None:
         names = self._selection.preparation.names

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from msgspec import structs
-from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -146,7 +146,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._tabs.currentChanged.connect(self._on_kind_changed)
         self._retired.toggled.connect(self._fill)
         self._table.selectionModel().currentRowChanged.connect(self._refresh_buttons)
-        self._table.doubleClicked.connect(self._on_double_clicked)
+        self._table.doubleClicked.connect(self._on_use_clicked)
         self._add.clicked.connect(lambda: self.add(""))
         self._retire.clicked.connect(self._on_retire_clicked)
         self._close.clicked.connect(self.accept)
@@ -305,9 +305,6 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         if item is not None and not item.is_retired and item.kind in SWUNG:
             self.accept()
             self.chosen.emit(item.kind, item.id)
-
-    def _on_double_clicked(self, _: QModelIndex) -> None:
-        self._on_use_clicked()
 
     def _on_save_clicked(self) -> None:
         if self._item is None or not self._save.isEnabled():

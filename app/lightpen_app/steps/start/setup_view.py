@@ -41,8 +41,6 @@ class DataFolderPanel(Translated, QGroupBox):
     def __init__(self, folder: Path, notifications: Notifications) -> None:
         super().__init__()
         self.say(self, self.tr("Data folder"))
-        self._folder = folder
-        self._notices = notifications
         self._fault = ""
 
         # Widgets
@@ -71,7 +69,9 @@ class DataFolderPanel(Translated, QGroupBox):
         fill(layout, self._doubt)
 
         # Connections
-        self._open.clicked.connect(self._on_open_clicked)
+        self._open.clicked.connect(
+            lambda: notifications.show_status(open_folder(folder))
+        )
         self._change.clicked.connect(self.change_requested)
 
         self._refresh()
@@ -80,9 +80,6 @@ class DataFolderPanel(Translated, QGroupBox):
         """Show why the folder cannot be written; an empty text ends it."""
         self._fault = fault
         self._refresh()
-
-    def _on_open_clicked(self) -> None:
-        self._notices.show_status(open_folder(self._folder))
 
     def _refresh(self) -> None:
         self._change.setProperty("inviting", bool(self._fault))

@@ -31,7 +31,6 @@ from lightpen.record.library.tip_library import (
     LONGEST_ID,
     AnyItem,
     Item,
-    ItemKind,
     Library,
     LibraryChange,
     ListedTip,
@@ -83,7 +82,8 @@ def change_item(
         library = read_library(data)
         there = library.item(item.kind, item.id)
         if there is None:
-            raise UsageError(no_such_item(item.kind, item.id))
+            kind, name = KIND_WORDS[item.kind], printable(item.id)
+            raise UsageError("library.no-such-item", kind=kind, id=name)
         if there == item:
             return library
         if before is not None and there != before:
@@ -94,11 +94,6 @@ def change_item(
             )
         with suppress(NameTakenError):  # another program changed the library meanwhile
             return _keep(data, number, item, by, now)
-
-
-def no_such_item(kind: ItemKind, name: str) -> Message:
-    """Return the error that an item is not in the library."""
-    return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
 
 
 def _keep(data: Path, number: int, item: AnyItem, by: Author, now: datetime) -> Library:
