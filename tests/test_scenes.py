@@ -155,31 +155,6 @@ def test_good_images_of_a_hard_scene_are_used_with_their_leds(
     assert n_missing <= 0.01 * n_shown
 
 
-@pytest.mark.slow
-def test_images_with_three_whole_leds_are_dropped_with_their_reason(
-    scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
-) -> None:
-    folder = scene(*CLEAN)
-    images = tmp_path / "images"
-    shutil.copytree(folder / "images", images)
-    spoilt = truth(folder)["frames"][4:7]
-    for frame in spoilt:
-        file = images / Path(frame["file"]).name
-        image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-        assert image is not None
-        for led in frame["leds"][:-3]:
-            x, y = led["ellipse_center"]
-            cv2.circle(image, (round(x), round(y) - 10), 3, 200, cv2.FILLED)
-        file.write_bytes(cv2.imencode(".png", image)[1].tobytes())
-    out = tmp_path / "out.json"
-    outcome = calibrate_set(lightpen, folder, "--json", str(out), images=images)
-    assert outcome.returncode == 0, outcome.stderr
-    assert "3 too few LEDs" in outcome.stdout
-    fields = json.loads(out.read_text(encoding="utf-8"))
-    reasons = [frame["reason"] for frame in fields["frames"]]
-    assert reasons == [""] * 4 + ["too few LEDs"] * 3 + [""] * 33
-
-
 def test_images_without_any_pen_are_refused(
     scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
