@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from enum import IntFlag
 from functools import partial
-from statistics import median
 from typing import Self, TypeVar
 
 import cv2
@@ -272,8 +271,7 @@ def _as_spots(discs: Discs, full_scale: float, noise: float, has_smears: bool) -
     moments, are_whole, leave = discs.moments, discs.are_whole, discs.leave_image
     contrasts = discs.levels.contrast
     # Merged is told from cut by size, if there is a whole disc to compare with.
-    whole = moments.area[are_whole].tolist()
-    usual = median(whole) if whole else np.nan
+    usual = np.median(moments.area[are_whole]) if are_whole.any() else np.nan
     unwhole = ~are_whole & ~leave
     have_flaws = (  # in the order of `SpotFlaw`
         (discs.cut_heights > MERGED_LEVEL) | (unwhole & ~(moments.area <= usual)),

@@ -28,7 +28,7 @@ _BMP_HEAD_OF_OS2 = 12  # bytes
 _JPEG_FRAMES = frozenset((*range(0xC0, 0xD0), 0xF7)) - {0xC4, 0xC8, 0xCC}
 _JPEG_PROGRESSIVE = frozenset({0xC2, 0xCA})
 _JPEG_LOSSLESS = frozenset({0xC3, 0xC7, 0xCB, 0xCF, 0xF7})
-_JPEG_SCAN = 0xDA
+JPEG_SCAN = 0xDA
 _JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
 _JPEG_MARKERS = 1000  # before the pixels; a colour profile takes 255
 _WEBP_ANIMATED = 0x02  # of the flags
@@ -116,7 +116,8 @@ def _reader(start: bytes, name: _Name) -> _Reader:
     raise _unknown_image(start, name)
 
 
-def _exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
+def exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
+    """Return bytes of a file that is long enough; else raise `FileError`."""
     data = stream.read(count)
     if len(data) < count:
         raise cut_off_image(name)
@@ -126,7 +127,7 @@ def _exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
 def _png(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(len(PNG_SIGNATURE))
     length, kind, width, height, depth, colour = struct.unpack(
-        ">I4sIIBB", _exactly(stream, 18, name)
+        ">I4sIIBB", exactly(stream, 18, name)
     )
     if (length, kind) != (13, b"IHDR"):
         raise damaged_image(name)
@@ -139,12 +140,12 @@ def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(2)
     frame, channels, pixels = 0, 0, (0, 0)
     for _ in range(_JPEG_MARKERS):
-        marker, length = _jpeg_segment(stream, name)
-        if marker == _JPEG_SCAN:
+        marker, length = jpeg_segment(stream, name)
+        if marker == JPEG_SCAN:
             break
         if marker in _JPEG_FRAMES:
             depth, height, width, channels = struct.unpack(
-                ">BHHB", _exactly(stream, 6, name)
+                ">BHHB", exactly(stream, 6, name)
             )
             if marker in _JPEG_LOSSLESS or depth == 12:
                 kind = "lossless or 12-bit JPEG"
@@ -155,7 +156,7 @@ def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
         stream.seek(length, 1)
     else:
         raise damaged_image(name)
-    (n_scanned,) = _exactly(stream, 1, name)
+    (n_scanned,) = exactly(stream, 1, name)
     if not frame:
         raise damaged_image(name)
     width, height = pixels
@@ -169,17 +170,17 @@ def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
     )
 
 
-def _jpeg_segment(stream: BinaryIO, name: _Name) -> tuple[int, int]:
+def jpeg_segment(stream: BinaryIO, name: _Name) -> tuple[int, int]:
     """Return the next marker and the length of its segment, bytes."""
     while True:
-        if _exactly(stream, 1, name) != b"\xff":
+        if exactly(stream, 1, name) != b"\xff":
             raise damaged_image(name)
-        (marker,) = _exactly(stream, 1, name)
+        (marker,) = exactly(stream, 1, name)
         while marker == 0xFF:  # fill bytes
-            (marker,) = _exactly(stream, 1, name)
+            (marker,) = exactly(stream, 1, name)
         if marker not in _JPEG_WITHOUT_LENGTH:
             break
-    (length,) = struct.unpack(">H", _exactly(stream, 2, name))
+    (length,) = struct.unpack(">H", exactly(stream, 2, name))
     if length < 2:
         raise damaged_image(name)
     return marker, length - 2
@@ -187,10 +188,10 @@ def _jpeg_segment(stream: BinaryIO, name: _Name) -> tuple[int, int]:
 
 def _bmp(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(14)
-    (size,) = struct.unpack("<I", _exactly(stream, 4, name))
+    (size,) = struct.unpack("<I", exactly(stream, 4, name))
     layout = "<HHHH" if size == _BMP_HEAD_OF_OS2 else "<iiHH"
     width, height, _, bits = struct.unpack(
-        layout, _exactly(stream, struct.calcsize(layout), name)
+        layout, exactly(stream, struct.calcsize(layout), name)
     )
     if width < 0:
         raise damaged_image(name)
@@ -201,9 +202,9 @@ def _bmp(stream: BinaryIO, name: _Name) -> ImageHeader:
 
 def _webp(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(12)
-    kind = _exactly(stream, 4, name)
+    kind = exactly(stream, 4, name)
     stream.seek(20)
-    head = _exactly(stream, 10, name)
+    head = exactly(stream, 10, name)
     if kind == b"VP8X":
         if head[0] & _WEBP_ANIMATED:
             raise animated_image(name)

@@ -4,7 +4,7 @@ import glob
 import os
 import re
 import struct
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -29,7 +29,12 @@ from lightpen.formats.decoding import (
     read_image,
 )
 from lightpen.formats.files import opened, unreadable
-from lightpen.formats.image_headers import PNG_SIGNATURE, read_image_header
+from lightpen.formats.image_headers import (
+    JPEG_SCAN,
+    PNG_SIGNATURE,
+    jpeg_segment,
+    read_image_header,
+)
 from lightpen.formats.tiff_pages import PagePlace, is_tiff, page_places, read_page
 from lightpen.formats.video_process import count_frames, frame_loaders
 from lightpen.messages import Message, message, printable
@@ -153,14 +158,12 @@ def _jpeg_parts(stream: BinaryIO) -> Iterator[bytes]:
     """Yield the APP1 segments of a JPEG."""
     stream.seek(2)
     for _ in range(MAX_PARTS):
-        head = stream.read(4)
-        if len(head) < 4 or head[0] != 0xFF or head[1] in (0xD9, 0xDA):
+        marker, length = jpeg_segment(stream, "")
+        if marker == JPEG_SCAN:
             return
-        length = int.from_bytes(head[2:], "big") - 2
-        if head[1] == 0xE1:
-            yield stream.read(max(length, 0))
-        else:
-            stream.seek(length, 1)
+        content = stream.read(length)
+        if marker == 0xE1:
+            yield content
 
 
 def _chunks(
@@ -337,14 +340,13 @@ def find_images(*places: str) -> ImageSource:
 
 def image_files(files: list[Path]) -> ImageSource:
     """Return the source of these image files, in their order, with all their pages."""
-    pages = [(file, place) for file in files for place in _pages(file)]
-    n_pages = Counter(file for file, _ in pages)
-    numbers: Counter[Path] = Counter()
-    names = []
-    for file, _ in pages:
-        numbers[file] += 1
-        page = f"{file.stem} page {numbers[file]}"
-        names.append(file.name if n_pages[file] == 1 else page)
+    pages: list[tuple[Path, PagePlace | FileError | None]] = []
+    names: list[str] = []
+    for file in files:
+        places = _pages(file)
+        pages += [(file, place) for place in places]
+        numbered = [f"{file.stem} page {i + 1}" for i in range(len(places))]
+        names += numbered if len(places) > 1 else [file.name]
 
     def loaders() -> Iterator[Callable[[], Image]]:
         for file, place in pages:

@@ -21,8 +21,8 @@ from lightpen.errors import FileError
 from lightpen.formats.image_headers import (
     ImageHeader,
     check_pixels,
-    cut_off_image,
     damaged_image,
+    exactly,
 )
 from lightpen.messages import Message
 
@@ -149,7 +149,7 @@ class TiffPage:
         pixels = []
         for offset, size in zip(offsets[own], sizes[own], strict=True):
             stream.seek(offset + self.place.skipped)
-            pixels.append(_exactly(stream, size, self.name))
+            pixels.append(exactly(stream, size, self.name))
         tags = {tag: self.tags[tag] for tag in _KEPT if tag in self.tags}
         if self.n_planes > 1:
             tags = {tag: values[:1] for tag, values in tags.items() if tag != _EXTRA}
@@ -237,7 +237,7 @@ class _Layout:
     @staticmethod
     def read(stream: BinaryIO, name: _Name) -> "_Layout":
         stream.seek(0)
-        start = _exactly(stream, 4, name)
+        start = exactly(stream, 4, name)
         if not is_tiff(start):
             raise damaged_image(name)
         return _Layout(_SIGNATURES[start], b"+" in start)
@@ -282,16 +282,16 @@ class _Layout:
     ) -> tuple[list[tuple[int, int, int, bytes]], int]:
         stream.seek(place)
         head = f"{self.order}{'Q' if self.is_big else 'H'}"
-        (count,) = struct.unpack(head, _exactly(stream, struct.calcsize(head), name))
+        (count,) = struct.unpack(head, exactly(stream, struct.calcsize(head), name))
         if count > MAX_ENTRIES:
             raise damaged_image(name)
         entry = f"{self.order}HH{'Q8s' if self.is_big else 'I4s'}"
-        data = _exactly(stream, struct.calcsize(entry) * count, name)
+        data = exactly(stream, struct.calcsize(entry) * count, name)
         return list(struct.iter_unpack(entry, data)), self._number(stream, name)
 
     def _number(self, stream: BinaryIO, name: _Name) -> int:
         layout = f"{self.order}{'Q' if self.is_big else 'I'}"
-        data = _exactly(stream, struct.calcsize(layout), name)
+        data = exactly(stream, struct.calcsize(layout), name)
         return int(struct.unpack(layout, data)[0])
 
     def _data(self, stream: BinaryIO, inline: bytes, size: int, name: _Name) -> bytes:
@@ -299,7 +299,7 @@ class _Layout:
             return inline[:size]
         (offset,) = struct.unpack(f"{self.order}{'Q' if self.is_big else 'I'}", inline)
         stream.seek(offset)
-        return _exactly(stream, size, name)
+        return exactly(stream, size, name)
 
 
 def _file(order: str, tags: _Tags, is_tiled: bool, pixels: list[bytes]) -> bytes:
@@ -321,10 +321,3 @@ def _file(order: str, tags: _Tags, is_tiled: bool, pixels: list[bytes]) -> bytes
         f"{order}2sHIH", b"II" if order == "<" else b"MM", 42, 8, len(tags)
     )
     return b"".join([head, *entries, bytes(4), *further, *pixels])
-
-
-def _exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
-    data = stream.read(count)
-    if len(data) < count:
-        raise cut_off_image(name)
-    return data
