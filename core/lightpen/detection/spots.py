@@ -224,8 +224,10 @@ def _spots_of(
     usual_area = 0.0 if is_few else np.median(discs.moments.area)
     if stride > 1 and (is_few or HARDLY_AREA < usual_area < SMALL_AREA):
         budget = iter(range(MAX_REGIONS))
-        scene = survey(image, mask, stride // 2 if is_few else 1)
-        discs = find_discs(scene, budget)
+        finer = survey(image, mask, stride // 2 if is_few else 1)
+        found = find_discs(finer, budget)
+        if is_few or len(found.boxes) > len(discs.boxes):
+            scene, discs = finer, found
     has_smears = False
     if len(discs.boxes) < MIN_POSE_LEDS or next(budget, None) is None:
         flat = survey(flattened(image, full_scale), mask, stride)
