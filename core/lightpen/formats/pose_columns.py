@@ -223,6 +223,9 @@ def rotations_of(values: FloatArray) -> FloatArray:
     good = np.isfinite(values).all(axis=1)
     if values.shape[1] == 4:
         good &= np.abs(np.linalg.norm(values, axis=1) - 1) < UNIT_TOLERANCE
+    if not good.any():  # of none SciPy 1.13 makes no matrices
+        return matrices
+    if values.shape[1] == 4:
         matrices[good] = Rotation.from_quat(np.roll(values[good], -1, 1)).as_matrix()
     else:
         matrices[good] = Rotation.from_rotvec(values[good]).as_matrix()
