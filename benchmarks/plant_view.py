@@ -38,7 +38,7 @@ INSERT INTO archive_writers (chain)
 INSERT INTO archive_entries (chain, number, sha256, since_us, kind, station, pen, tip,
     is_simulated, swing, result, concerns, record_sha256, text, at_us, signature)
 SELECT md5((n %% %(s)s)::text), n, encode(sha256(convert_to(t.text, 'UTF8')), 'hex'),
-    t.at, CASE WHEN n %% 50 = 0 THEN 'taken back' WHEN n %% 7 = 0 THEN 'refused'
+    t.at, CASE WHEN n %% 50 = 0 THEN 'revoked' WHEN n %% 7 = 0 THEN 'refused'
     ELSE 'accepted' END, 'Hall ' || n %% %(s)s, 'LP-' || n %% %(p)s,
     'T-' || n %% %(t)s, n %% 11 = 0, 'records/' || n, 'results/' || n, '', '', t.text,
     t.at, ''
@@ -48,7 +48,7 @@ FROM generate_series(1, %(n)s) n CROSS JOIN LATERAL (SELECT
     || '","reason":"' || repeat('x', 1200) || '","tip_pen_mm":[' || n
     || '.5,-90.0,-25.0]}}' AS text, 1600000000000000 + n * 1600000000::bigint AS at) t;
 UPDATE archive_entries b SET concerns = e.sha256 FROM archive_entries e
-    WHERE b.kind = 'taken back' AND e.number = b.number - 10;
+    WHERE b.kind = 'revoked' AND e.number = b.number - 10;
 """
 
 

@@ -359,7 +359,7 @@ class Stage:
         self._wait_until(lambda: probing.status.is_touching)
         before = probing.status
         assert before.setup is not None
-        probing.runner.ask(lambda workflow: workflow.leave())
+        probing.runner.ask(lambda workflow: workflow.note_departure())
         self._wait_until(lambda: not probing.status.is_here)
         state = probed(before.setup, self._scene)
         status = replace(

@@ -306,16 +306,16 @@ FORGED: dict[str, Callable[[Station], None]] = {
         " (SELECT max(number) FROM archive_entries)"
     ),
     "the entry of the revocation is removed": all_of(
-        change("DELETE FROM archive_entries WHERE kind = 'taken back'"),
+        change("DELETE FROM archive_entries WHERE kind = 'revoked'"),
         remove("results/000003.json"),
     ),
     "the revocation is hidden from searches": all_of(
-        change("UPDATE archive_entries SET result = '' WHERE kind = 'taken back'"),
+        change("UPDATE archive_entries SET result = '' WHERE kind = 'revoked'"),
         remove("results/000003.json"),
     ),
     "the entry of the revocation is reworded": change(
-        "UPDATE archive_entries SET text = replace(text, 'taken back', 'note')"
-        " WHERE kind = 'taken back'"
+        "UPDATE archive_entries SET text = replace(text, 'revoked', 'note')"
+        " WHERE kind = 'revoked'"
     ),
     "two entries change places": change(
         "UPDATE archive_entries SET number = 99 WHERE number = 3;"

@@ -145,7 +145,7 @@ class Verifier:
         """Be at it, and wait until the tip is read."""
         n_read = self.ear.n_read
         self.runner.ask(lambda workflow: workflow.choose(self.preparation, choices))
-        self.runner.ask(lambda workflow: workflow.come())
+        self.runner.ask(lambda workflow: workflow.note_arrival())
         self.ear.wait_until(lambda: self.ear.n_read > n_read)
 
     def refusal(self) -> str:
@@ -159,7 +159,7 @@ class Verifier:
             wanted = region or self.status.region
             assert wanted is not None
             frame = replace(FRAME, others=(FRAME,) * (len(wanted.regions) - 1))
-            self.runner.take(frame, detection, wanted)
+            self.runner.process_image(frame, detection, wanted)
 
     def touch(self, *holds: Hold) -> None:
         self.pick_up()

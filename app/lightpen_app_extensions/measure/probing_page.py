@@ -161,14 +161,14 @@ class ProbingPage(ResponsiveLayout, Page):
     def entered(self) -> None:
         if not self._live.is_open:
             self._camera.open()
-        self._runner.ask(lambda workflow: workflow.come())
+        self._runner.ask(lambda workflow: workflow.note_arrival())
         self._show()
 
     @override
     def left(self) -> None:
         self._progress.hide_question()
         self._simulator.stop()
-        self._runner.ask(lambda workflow: workflow.leave())
+        self._runner.ask(lambda workflow: workflow.note_departure())
 
     @override
     def unsaved(self) -> str:

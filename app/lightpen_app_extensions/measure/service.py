@@ -186,7 +186,7 @@ class MeasureService(Service):
         self.set_choices(again)  # as in the session
         self._resumed = found
         run = self.measuring if is_part else self.verification
-        run.runner.ask(lambda workflow: workflow.go_on(found))
+        run.runner.ask(lambda workflow: workflow.continue_session(found))
 
     def _update_runners(self) -> None:
         chosen, choices = self._selection.preparation, self.choices

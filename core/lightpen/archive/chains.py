@@ -69,7 +69,7 @@ class Kind(StrEnum):
     ACCEPTED = "accepted"
     REFUSED = "refused"
     ABANDONED = "abandoned"
-    TAKEN_BACK = "taken back"
+    REVOKED = "revoked"
     NOTE = "note"
     LIBRARY = "library"
     VERIFICATION = "verification"
@@ -325,7 +325,7 @@ def is_swing_entered(database: Database, chain: str, place: str) -> bool:
     )
     with database.reading() as connection:
         kind = connection.execute(last).scalar_one_or_none()
-    return kind not in (None, Kind.TAKEN_BACK.value)
+    return kind not in (None, Kind.REVOKED.value)
 
 
 def head_in(connection: Connection, chain: str) -> ChainHead:

@@ -66,7 +66,7 @@ def event_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
         event = _event_of_acceptance(results, place, found)
         return ExtractedEvent(event, file_text(content))
     event = Event(
-        kind=Kind.TAKEN_BACK,
+        kind=Kind.REVOKED,
         at=found.at,
         names=found.names,
         program=this_program(),

@@ -130,7 +130,7 @@ def revoked(entries: FromClause) -> Exists:
     back = ENTRIES.alias()
     return exists().where(
         back.c.concerns == entries.c.sha256,
-        back.c.kind == Kind.TAKEN_BACK.value,
+        back.c.kind == Kind.REVOKED.value,
         func.coalesce(back.c.chain, "") == entries.c.chain,  # by the index of concerns
     )
 
@@ -173,7 +173,7 @@ class TipState(StrEnum):
     NONE = ""
     IN_FORCE = "in force"
     REPLACED = "replaced"
-    TAKEN_BACK = "taken back"
+    REVOKED = "revoked"
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ def lines(
     found = (
         select(
             ENTRIES,
-            revoked(ENTRIES).label("is_taken_back"),
+            revoked(ENTRIES).label("is_revoked"),
             replaced(ENTRIES).label("is_replaced"),
         )
         .join(
@@ -253,7 +253,7 @@ def _line(row: Row[Any]) -> Line:
     state = TipState.NONE
     if entry is not None and entry.entry.event.kind is Kind.ACCEPTED:
         state = TipState.REPLACED if row.is_replaced else TipState.IN_FORCE
-        state = TipState.TAKEN_BACK if row.is_taken_back else state
+        state = TipState.REVOKED if row.is_revoked else state
     return Line(row.chain, row.number, entry, state)
 
 

@@ -66,7 +66,7 @@ def trend_of(database: Database, wanted: EntryFilter) -> Trend:
         for each in reversed(found)
         if each.entry is not None
         and has_tip(each.entry)
-        and each.state is not TipState.TAKEN_BACK
+        and each.state is not TipState.REVOKED
     )
     tips = tuple(map(tip_of, entries))
     return Trend(

@@ -81,7 +81,7 @@ class ImageListener(Protocol):
     def is_heard(self) -> bool:
         """Whether it needs every image."""
 
-    def take(self, frame: Frame, detection: PenDetection | None) -> None:
+    def process_image(self, frame: Frame, detection: PenDetection | None) -> None:
         """Handle a processed image; returns at once."""
 
 
@@ -100,7 +100,7 @@ class ImageCapture(Protocol):
     def stage(self) -> object:
         """Where it stands; another stage counts as a motion."""
 
-    def take(
+    def process_image(
         self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
     ) -> None:
         """Take an image that was searched for this region."""
@@ -334,7 +334,7 @@ class Live:
     def _notify_others(self, image: LiveImage) -> None:
         """Give the detection to the listeners."""
         for each in self._listeners:
-            each.take(image.frame, image.detection)
+            each.process_image(image.frame, image.detection)
 
     def _take_newest(self) -> None:
         """Process the newest image of each camera."""
@@ -375,7 +375,7 @@ class Live:
             detection = replace(detections[0], others=tuple(detections[1:]))
         other = self._other
         if other is not None and captured.other is not None:
-            other.take(frame, detection, captured.other)
+            other.process_image(frame, detection, captured.other)
         else:
             self._hand_over(frame, detection, captured.swing)
         sink = self._sink

@@ -134,14 +134,14 @@ class VerificationWorkflow:
         if status.is_here and (is_other or has_none):
             self._read_tip()
 
-    def come(self) -> None:
+    def note_arrival(self) -> None:
         """Operator present: read the current tip, and take images."""
         self._publish(replace(self._rested(), is_here=True))
         self._write()
         if self._status.reading is not ReadingState.IMAGES:
             self._read_tip()
 
-    def leave(self) -> None:
+    def note_departure(self) -> None:
         """Operator absent: take no images."""
         self._publish(replace(self._status, is_here=False))
 
@@ -180,7 +180,7 @@ class VerificationWorkflow:
             return
         self._become(transition)
 
-    def go_on(self, interrupted: InterruptedVerification) -> None:
+    def continue_session(self, interrupted: InterruptedVerification) -> None:
         """Resume an interrupted verification, or report why that is impossible."""
         preparation, under_way = self._preparation, interrupted.under_way
         status = self._status
@@ -198,11 +198,11 @@ class VerificationWorkflow:
         self._start(
             ReadingState.IMAGES,
             lambda _: resume_verification(archive, preparation, path, again),
-            partial(self._on_gone_on, path),
+            partial(self._on_continued, path),
             self._on_not_resumed,
         )
 
-    def _on_gone_on(self, path: Path, before: ResumedVerification) -> None:
+    def _on_continued(self, path: Path, before: ResumedVerification) -> None:
         self._give_up()
         try:
             self._keeping.take_over(path, before)
@@ -237,10 +237,10 @@ class VerificationWorkflow:
 
     # Images
 
-    def take(
+    def process_image(
         self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
     ) -> None:
-        """Process an image, see `VerificationRunner.take`."""
+        """Process an image, see `VerificationRunner.process_image`."""
         status = self._status
         if not status.is_touching or region is not status.region or detection is None:
             return
@@ -251,7 +251,7 @@ class VerificationWorkflow:
             self._status = replace(status, began=self._now())
         try:
             images = self._keeping.images
-            transition = images.take(setup, state, frame, detection)
+            transition = images.process_image(setup, state, frame, detection)
         except FileError as error:  # an image that is not kept does not count
             self._faults.report(error.message, Cause.IMAGES)
             return
@@ -451,7 +451,7 @@ class VerificationRunner(WorkflowRunner[VerificationWorkflow]):
         status = self.status
         return status.task if status.is_touching else None
 
-    def take(
+    def process_image(
         self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
     ) -> None:
         """Take an image, and return when it is processed.
@@ -459,4 +459,6 @@ class VerificationRunner(WorkflowRunner[VerificationWorkflow]):
         The detection is None if the image has the wrong size; images searched for
         another region are ignored.
         """
-        self._queue.ask_and_wait(lambda: self._workflow.take(frame, detection, region))
+        self._queue.ask_and_wait(
+            lambda: self._workflow.process_image(frame, detection, region)
+        )

@@ -219,7 +219,7 @@ def _play(listened: _Listened, stream: PoseStream) -> None:
                 before = detect_pen(
                     frame.image, camera, pen, mask, before, frame.full_scale
                 )
-                stream.take(frame, before)
+                stream.process_image(frame, before)
     except EndOfImages:
         if failures:
             raise failures[-1] from None

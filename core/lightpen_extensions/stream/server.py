@@ -185,7 +185,7 @@ class PoseStream:
         """Stream the position of another tip from the next image on."""
         self._tip = tip
 
-    def take(self, frame: Frame, detection: PenDetection | None) -> None:
+    def process_image(self, frame: Frame, detection: PenDetection | None) -> None:
         """Stream a detection if it shows the pen; returns at once."""
         waker = self._waker
         if waker is None or not self.is_heard:

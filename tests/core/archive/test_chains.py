@@ -67,7 +67,7 @@ def test_what_was_taken_back_is_not_the_last_accepted(station: Station) -> None:
     first, second = station.enter(2)
     back = structs.replace(
         second.entry.event,
-        kind=Kind.TAKEN_BACK,
+        kind=Kind.REVOKED,
         record_sha256=None,
         concerns=second.sha256,
     )

@@ -27,7 +27,7 @@ from lightpen.model.names import Origin
 
 ALL = EntryFilter()
 IN_FORCE, REPLACED = TipState.IN_FORCE, TipState.REPLACED
-TAKEN_BACK = TipState.TAKEN_BACK
+REVOKED = TipState.REVOKED
 
 
 def enter(station: Station, event: Event) -> StoredEntry:
@@ -57,8 +57,8 @@ def test_the_newest_tip_that_was_not_taken_back_is_in_force(station: Station) ->
     *_, last = station.enter(3)
     assert states(station) == [IN_FORCE, REPLACED, REPLACED]
 
-    enter(station, about(last, Kind.TAKEN_BACK, 10))
-    assert states(station) == [TAKEN_BACK, IN_FORCE, REPLACED]
+    enter(station, about(last, Kind.REVOKED, 10))
+    assert states(station) == [REVOKED, IN_FORCE, REPLACED]
 
 
 def test_a_simulated_or_another_tip_replaces_none(station: Station) -> None:
@@ -137,11 +137,11 @@ def test_a_changed_entry_is_reported_and_nothing_it_says_is_shown(
 
 def test_what_concerns_an_entry_is_found_in_its_order(station: Station) -> None:
     first, second = station.enter(2)
-    for kind in (Kind.NOTE, Kind.TAKEN_BACK):
+    for kind in (Kind.NOTE, Kind.REVOKED):
         enter(station, about(first, kind, 10))
 
     kinds = [each.entry.event.kind for each in messages_on(station.database, first)]
-    assert kinds == [Kind.NOTE, Kind.TAKEN_BACK]
+    assert kinds == [Kind.NOTE, Kind.REVOKED]
     assert messages_on(station.database, second) == ()
 
 

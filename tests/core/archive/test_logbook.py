@@ -129,7 +129,7 @@ def test_results_of_earlier_versions_are_taken_over_once_and_stay(data: Path) ->
     assert [file.read_bytes() for file in archive.all_files()] == before
 
 
-def test_what_is_taken_back_names_the_entry_of_its_result(
+def test_what_is_revoked_names_the_entry_of_its_result(
     data: Path, logbook: Logbook
 ) -> None:
     archive = FolderArchive(data)
@@ -139,7 +139,7 @@ def test_what_is_taken_back_names_the_entry_of_its_result(
 
     accepted, back = entries_of(logbook.database, logbook.chain)
     event = back.entry.event
-    assert (event.kind, event.concerns) == (Kind.TAKEN_BACK, accepted.sha256)
+    assert (event.kind, event.concerns) == (Kind.REVOKED, accepted.sha256)
     assert event.names == replace(NAMES, operator="Ben")
     assert event.at == NOON + timedelta(days=1)
 
@@ -156,7 +156,7 @@ def test_a_swing_is_entered_that_was_set_aside_after_its_result_was_taken_back(
         logbook.enter_owed()
 
     assert [entry.event.kind for entry in entered(logbook)] == [
-        *(Kind.ACCEPTED, Kind.TAKEN_BACK, Kind.ABANDONED)
+        *(Kind.ACCEPTED, Kind.REVOKED, Kind.ABANDONED)
     ]
 
 

@@ -64,7 +64,7 @@ def test_accepted_and_taken_back_tips_are_entered(
     logging.runner.ask(lambda workflow: workflow.solving.revoke(result, "Ben"))
     logging.wait_until(lambda: logging.status.revoked is not None)
     _, back = entered(logging)
-    assert (back.kind, back.names.operator) == (Kind.TAKEN_BACK, "Ben")
+    assert (back.kind, back.names.operator) == (Kind.REVOKED, "Ben")
 
 
 def test_a_tip_that_is_not_accepted_is_entered_as_refused_with_its_verdict(

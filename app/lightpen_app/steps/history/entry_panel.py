@@ -45,7 +45,7 @@ _KINDS: dict[Kind, str] = {
     Kind.ACCEPTED: QT_TRANSLATE_NOOP("history", "Calibration"),
     Kind.REFUSED: QT_TRANSLATE_NOOP("history", "Rejected"),
     Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Abandoned"),
-    Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Revocation"),
+    Kind.REVOKED: QT_TRANSLATE_NOOP("history", "Revocation"),
     Kind.NOTE: QT_TRANSLATE_NOOP("history", "Comment"),
     Kind.LIBRARY: QT_TRANSLATE_NOOP("history", "Tip library"),
     Kind.VERIFICATION: QT_TRANSLATE_NOOP("history", "Verification"),
@@ -61,7 +61,7 @@ _OUTCOMES: dict[TrialOutcome, str] = {
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "current"),
     TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
-    TipState.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "revoked"),
+    TipState.REVOKED: QT_TRANSLATE_NOOP("history", "revoked"),
 }
 _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "id": "{0}",

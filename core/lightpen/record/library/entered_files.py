@@ -219,7 +219,7 @@ class _Reading:
         self.hashes: list[str] = []
         self._keys = ChainKeys(chain)
 
-    def go_on(self, connection: sqlite3.Connection) -> None:
+    def read_new(self, connection: sqlite3.Connection) -> None:
         """Read the entries that are new."""
         rows = connection.execute(
             "SELECT number, sha256, text, signature FROM archive_entries"
@@ -312,7 +312,7 @@ def _read(data: Path) -> _Reading:
             if reading is None or not _is_continued(connection, reading, chain):
                 reading = _Reading(data, chain)
             _readings.pop(data, None)  # unless the rest is sound
-            reading.go_on(connection)
+            reading.read_new(connection)
             _readings[data] = reading
             return reading
     except (sqlite3.Error, UnicodeDecodeError, OSError) as error:

@@ -138,7 +138,7 @@ class SessionRecord:
         digest = hashed(self._folder / JOURNAL).sha256
         return [{"folder": self._folder.name, "journal_sha256": digest}]
 
-    def take(
+    def process_image(
         self,
         setup: SessionSetup,
         state: SessionState,

@@ -76,7 +76,7 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
 def test_a_tip_that_was_taken_back_is_not_in_the_trend(database: Database) -> None:
     entry = enter(database, 1.0)
     back = Event(
-        kind=Kind.TAKEN_BACK,
+        kind=Kind.REVOKED,
         at=NOON,
         names=entry.entry.event.names,
         program="lightpen 1",

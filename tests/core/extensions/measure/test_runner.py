@@ -109,7 +109,7 @@ def test_what_cannot_be_kept_is_reported_and_kept_later(at_it: Verifier) -> None
     assert set(at_it.ear.faults) == {"results.no-folder"}
 
     at_it.kept.unlink()
-    at_it.runner.ask(lambda workflow: workflow.come())
+    at_it.runner.ask(lambda workflow: workflow.note_arrival())
     at_it.ear.wait_until(lambda: bool(at_it.ear.reliefs))
     assert [each["outcome"] for each in at_it.conclusions] == ["abandoned"]
 
@@ -117,7 +117,7 @@ def test_what_cannot_be_kept_is_reported_and_kept_later(at_it: Verifier) -> None
 def test_nothing_is_taken_while_nobody_is_there(at_it: Verifier) -> None:
     region = at_it.status.region
     at_it.touch(leant(4)[0])
-    at_it.runner.ask(lambda workflow: workflow.leave())
+    at_it.runner.ask(lambda workflow: workflow.note_departure())
     for hold in leant(4)[1:]:
         at_it.see(at_it.holder.still(hold), region)
     assert at_it.status.state is not None
@@ -181,7 +181,7 @@ def test_what_is_not_known_is_asked_for(at_it: Verifier) -> None:
 
 def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(at_it: Verifier) -> None:
     at_it.touch(*leant(4))
-    at_it.runner.ask(lambda workflow: workflow.leave())
+    at_it.runner.ask(lambda workflow: workflow.note_departure())
     accept_tip(at_it.folder, at_it.preparation, seed=4)
     at_it.come()
 

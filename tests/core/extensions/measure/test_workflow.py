@@ -83,14 +83,14 @@ class Trace:
 
     def come(self, choices: VerificationChoices = CHOICES) -> None:
         self.workflow.choose(self.prepared, choices)
-        self.workflow.come()
+        self.workflow.note_arrival()
         self.settle()
 
     def see(self, detections: Iterator[PenDetection]) -> None:
         region = self.workflow.status.region
         assert region is not None
         for detection in detections:
-            self.workflow.take(FRAME, detection, region)
+            self.workflow.process_image(FRAME, detection, region)
 
     def touch(self, *holds: Hold, n_images: int = 6) -> None:
         for hold in holds:
@@ -150,9 +150,9 @@ def test_a_verification_with_pauses_and_points_taken_back(trace: Trace) -> None:
     trace.touch(leant(4)[2])
     act.toggle_pause()
     trace.pick_up()
-    act.leave()
+    act.note_departure()
     trace.touch(leant(4)[2])
-    act.come()
+    act.note_arrival()
     trace.settle()
     trace.pick_up()
     trace.touch(*leant(4)[1:3])
@@ -177,7 +177,7 @@ def test_a_verification_with_pauses_and_points_taken_back(trace: Trace) -> None:
 
 def test_a_verification_with_other_choices(trace: Trace) -> None:
     act = trace.workflow
-    act.come()  # nothing is chosen
+    act.note_arrival()  # nothing is chosen
     act.end_task()
     trace.come(replace(CHOICES, kind=PART.kind, plan=None))
     trace.come()
@@ -196,8 +196,8 @@ def test_a_verification_with_other_choices(trace: Trace) -> None:
     act.choose(other, faster)
     trace.settle()
     accept_tip(trace.folder, trace.prepared, seed=4)
-    act.leave()
-    act.come()
+    act.note_departure()
+    act.note_arrival()
     trace.settle()
     trace.pick_up()
     trace.touch(leant(4)[0])
@@ -259,7 +259,7 @@ def test_a_verification_with_another_camera_file_is_not_resumed(
     again = Trace(copy, replace(trace.prepared, camera_file=CameraFile.read(renewed)))
     (interrupted,) = find_interrupted(copy)
     again.come()
-    again.workflow.go_on(interrupted)
+    again.workflow.continue_session(interrupted)
     again.settle()
     assert again.faults == ["under-way.other-files"]
     assert find_interrupted(copy) == (interrupted,)

@@ -149,7 +149,7 @@ def covariance_in(message: TransformMessage) -> FloatArray:
 def test_a_client_receives_the_pose_with_its_covariance(
     stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(7), detection)
+    stream.process_image(frame(7), detection)
 
     message = received(client, "PenToCamera")
 
@@ -175,7 +175,7 @@ def test_it_receives_the_tip_as_a_touch_would_measure_it(
     seen = ProbingFrame("", pixels, detection.rotation, detection.translation)
     (touch,) = measure_touches(instrument, [StillFrames((seen,))])
 
-    stream.take(frame(), detection)
+    stream.process_image(frame(), detection)
     message = received(client, "TipToCamera")
 
     np.testing.assert_allclose(message.matrix[:3, 3], touch.point_cam, atol=1e-4)
@@ -187,7 +187,7 @@ def test_it_receives_the_tip_as_a_touch_would_measure_it(
 def test_a_name_that_is_not_ascii_arrives_escaped(
     stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(), detection)
+    stream.process_image(frame(), detection)
 
     assert received(client, "TipToCamera").metadata["Pen"] == r"\u5149\u7b14-04"
 
@@ -206,7 +206,7 @@ def test_origin_verdict_due_date_and_status_of_the_tip_are_in_the_metadata(
     )
     reported = tip_metadata(calibration)
     stream.set_tip(StreamedTip(Names(), instrument, reported))
-    stream.take(frame(), detection)
+    stream.process_image(frame(), detection)
 
     metadata = received(client, "TipToCamera").metadata
     assert metadata["Origin"] == "simulated"
@@ -219,9 +219,9 @@ def test_without_a_tip_in_force_the_pose_goes_out_alone(
     stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
     stream.set_tip(None)
-    stream.take(frame(), detection)
+    stream.process_image(frame(), detection)
     received(client, "PenToCamera")
-    stream.take(frame(), detection)
+    stream.process_image(frame(), detection)
     received(client, "PenToCamera")
 
     assert client.wait_for_message("TipToCamera", timeout=0) is None
@@ -231,7 +231,7 @@ def test_a_message_tells_when_its_image_was_taken(
     stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
     before = time.time()
-    stream.take(frame(age_s=100.0), detection)
+    stream.process_image(frame(age_s=100.0), detection)
     after = time.time()
 
     taken = received(client, "PenToCamera").timestamp
@@ -241,9 +241,9 @@ def test_a_message_tells_when_its_image_was_taken(
 def test_an_image_without_the_pen_sends_nothing(
     stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(1), replace(detection, reason=Reason.EMPTY))
-    stream.take(frame(2), None)
-    stream.take(frame(3), detection)
+    stream.process_image(frame(1), replace(detection, reason=Reason.EMPTY))
+    stream.process_image(frame(2), None)
+    stream.process_image(frame(3), detection)
 
     assert received(client, "PenToCamera").metadata["Image"] == "3"
 
@@ -267,7 +267,7 @@ def test_a_client_that_stalls_holds_up_nobody_and_misses_poses(
         statuses.wait_for_clients(2)
 
         for number in range(100):  # more than lies between the two
-            stream.take(frame(number), detection)
+            stream.process_image(frame(number), detection)
             assert received(client, "TipToCamera").metadata["Image"] == str(number)
         assert stream.status.n_slow == 1
 
@@ -288,7 +288,7 @@ def test_what_a_client_says_is_passed_over(
     with socket.create_connection((LOOPBACK, port_of(stream))) as rude:
         statuses.wait_for_clients(2)
         rude.sendall(b"GET / HTTP/1.1\r\n\r\n" * 1000)
-        stream.take(frame(), detection)
+        stream.process_image(frame(), detection)
 
         received(client, "PenToCamera")
 
@@ -298,7 +298,7 @@ def test_it_is_closed_until_it_is_opened_and_after_it_is_closed(
 ) -> None:
     stream = PoseStream()
     assert stream.status == StreamStatus()
-    stream.take(frame(), detection)  # of which nothing comes
+    stream.process_image(frame(), detection)  # of which nothing comes
 
     stream.open(ANY)
     place = LOOPBACK, port_of(stream)
@@ -359,7 +359,7 @@ def is_served(
     """Return whether a client receives poses, or was turned away."""
     client.settimeout(0.05)
     while True:
-        stream.take(frame(), detection)
+        stream.process_image(frame(), detection)
         with suppress(TimeoutError):
             return client.recv(1) != b""
 
@@ -399,6 +399,6 @@ def test_a_client_that_takes_no_data_is_dropped(
         number = 0
         while stream.is_heard:  # until its buffers are full and it is dropped
             number += 1
-            stream.take(frame(number), detection)
+            stream.process_image(frame(number), detection)
             time.sleep(0.001)
         statuses.wait_for_clients(0)

@@ -98,8 +98,8 @@ def interrupted_in(folder: Path) -> InterruptedVerification:
 def go_on(verifier: Verifier) -> SessionState:
     """Go on with what was interrupted, and return what is there then."""
     interrupted = interrupted_in(verifier.folder)
-    verifier.runner.ask(lambda workflow: workflow.go_on(interrupted))
-    verifier.runner.ask(lambda workflow: workflow.come())
+    verifier.runner.ask(lambda workflow: workflow.continue_session(interrupted))
+    verifier.runner.ask(lambda workflow: workflow.note_arrival())
     verifier.ear.wait_until(lambda: verifier.status.began is not None)
     assert verifier.ear.faults == []
     assert verifier.status.state is not None
@@ -327,7 +327,7 @@ def test_with_another_tip_in_force_it_cannot_be_gone_on_with(
     shutil.copytree(in_force, copy)
     accept_tip(copy, prepared, seed=4)
     second = verifying(copy)
-    second.runner.ask(lambda workflow: workflow.go_on(interrupted_in(copy)))
+    second.runner.ask(lambda workflow: workflow.continue_session(interrupted_in(copy)))
     second.ear.wait_until(lambda: second.ear.faults == ["under-way.other-tip"])
 
     assert second.status.began is None
