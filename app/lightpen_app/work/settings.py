@@ -6,7 +6,7 @@ window.
 """
 
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar, get_type_hints
@@ -23,14 +23,13 @@ from lightpen.cameras.sources import source_named
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
-from lightpen.model.limits import USUAL, Assumptions, SwingLimits
-from lightpen.model.names import Laboratory, Method
-from lightpen.record.swings.header import Names
+from lightpen.model.names import Laboratory
 from lightpen.swing.preparation import (
     NO_SOURCE,
     Preparation,
     SecondCamera,
     SourceChoice,
+    StationChoices,
 )
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
@@ -68,26 +67,16 @@ class FilePaths:
 
 
 @dataclass(frozen=True)
-class Station:
+class Station(StationChoices):
     """Last choices at a station."""
 
-    names: Names = field(default_factory=Names)
     # Nominal tip centre, mm, pen frame; None: the LED file's.
     nominal_tip: Triple | None = None
     camera: StoredCamera = field(default_factory=StoredCamera)
     second: StoredCamera | None = None  # None for a single camera
     files: FilePaths = field(default_factory=FilePaths)
-    limits: SwingLimits = field(default_factory=SwingLimits)
-    assumptions: Assumptions = USUAL
-    method: Method = "joint"  # of the reported tip
     # Choices for extensions by their keys, each as it stores them.
     extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
-    heading: float | None = None  # the operator's right as the camera sees it, rad
-    temperature_day: str = ""  # see `Preparation`
-
-
-# What a station and a `Preparation` have alike.
-ALIKE = "limits", "assumptions", "method", "heading", "temperature_day"
 
 
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
@@ -96,9 +85,9 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
     A source of a later version is passed over.
     """
     camera, second, tip = station.camera, station.second, station.nominal_tip
+    kept = _kept(station) | {"names": replace(station.names, station=name)}
     return replace(
         before,
-        names=replace(station.names, station=name),
         nominal_tip=None if tip is None else np.array(tip),
         source=camera.source if _is_known(camera) else NO_SOURCE,
         second=SecondCamera(second.source, mask=mask_of(second.mask))
@@ -107,7 +96,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         camera_file=None,
         pen_file=None,
         mask=mask_of(camera.mask),
-        **{name: getattr(station, name) for name in ALIKE},
+        **kept,
     )
 
 
@@ -119,7 +108,6 @@ def station_of(
     camera_file, pen_file = preparation.camera_file, preparation.pen_file
     rig_file = preparation.rig_file
     return Station(
-        names=preparation.names,
         nominal_tip=None if tip is None else tuple(tip.tolist()),
         camera=StoredCamera(preparation.source, circles_of(preparation.mask)),
         second=None
@@ -132,8 +120,12 @@ def station_of(
             unread.rig if rig_file is None else str(rig_file.path),
         ),
         extensions=extensions,
-        **{name: getattr(preparation, name) for name in ALIKE},
+        **_kept(preparation),
     )
+
+
+def _kept(choices: StationChoices) -> dict[str, Any]:
+    return {each.name: getattr(choices, each.name) for each in fields(StationChoices)}
 
 
 def _is_known(camera: StoredCamera) -> bool:

@@ -98,10 +98,21 @@ class MissingInput(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Preparation:
-    """The choices for a calibration."""
+class StationChoices:
+    """What is chosen at a station and kept as it is."""
 
     names: Names = field(default_factory=Names)
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    assumptions: Assumptions = USUAL
+    method: Method = "joint"  # of the reported tip
+    heading: float | None = None  # operator's right in the image, rad, once learnt
+    temperature_day: str = ""  # ISO date of the temperature in the assumptions
+
+
+@dataclass(frozen=True, eq=False)
+class Preparation(StationChoices):
+    """The choices for a calibration."""
+
     nominal_tip: FloatArray | None = None  # (3,), mm; None: the LED file's
     source: SourceChoice = field(default_factory=SourceChoice)
     image_size: tuple[int, int] | None = None  # px; None while there are no images
@@ -110,12 +121,7 @@ class Preparation:
     pen_file: PenFile | None = None
     # (M, 3), circles of stray light: centre x, y and radius, px
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    limits: SwingLimits = field(default_factory=SwingLimits)
-    assumptions: Assumptions = USUAL
-    method: Method = "joint"  # of the reported tip
     second: SecondCamera | None = None  # None for a single camera
-    heading: float | None = None  # operator's right in the image, rad, once learnt
-    temperature_day: str = ""  # ISO date of the temperature in the assumptions
 
     @property
     def asks_temperature(self) -> bool:
