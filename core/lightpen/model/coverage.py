@@ -269,10 +269,15 @@ def inverse(matrix: FloatArray) -> FloatArray:
     By Cholesky decomposition after scaling, since the unknowns have different units.
     Raises `numpy.linalg.LinAlgError` unless it is positive definite.
     """
+    from scipy.linalg.lapack import dpotrf, dpotri  # takes 0.03 s
+
     scale = 1 / np.sqrt(np.diag(matrix))
-    # As scipy.linalg.cho_solve, whose import takes 0.03 s.
-    root = np.linalg.inv(np.linalg.cholesky(matrix * np.outer(scale, scale))) * scale
-    return np.asarray(root.T @ root)
+    scales = np.outer(scale, scale)
+    root, flaw = dpotrf(matrix * scales, lower=1)
+    if flaw or not np.isfinite(scale).all():
+        raise np.linalg.LinAlgError("The matrix is not positive definite.")
+    lower = np.tril(dpotri(root, lower=1)[0]) * scales
+    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 def symmetric_root(covariance: FloatArray) -> FloatArray:

@@ -186,8 +186,7 @@ def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldCompone
         estimates = gains * (ways.T @ right)
         moments += ways @ (estimates.T * weight) @ estimates @ ways.T
     mean = average @ right
-    root = symmetric_root(average)
-    covariance = root @ np.linalg.inv(np.eye(size) - root @ S @ root) @ root
+    covariance = np.linalg.solve(np.eye(size) - average @ S, average)
     return FieldComponent(
         float(sigmas[int(np.argmin(costs.min(axis=0)))]),
         -best,
