@@ -134,6 +134,8 @@ def _n_left_after_start(data: Path) -> int:
     """Do what a start does with leftovers, and return how many there are then."""
     if any(not (f / "header.json").exists() for f in (data / RECORDS).iterdir()):
         time.sleep(OLDEST)
+    for part in data.rglob(".*.part"):  # as old as by the start of the next day
+        os.utime(part, (0, 0))
     sweep_leftovers(data)
     load(data / "lightpen.json")
     if (data / "tip.json").exists():

@@ -381,7 +381,7 @@ def _write_set(
     from tests.simulated_pens import SAMPLE_PENS
     from tests.simulated_swings import plan_kind
 
-    from lightpen_extensions.simulator.scene_files import write_plan
+    from lightpen_extensions.simulator.scene_files import write_set
     from lightpen_extensions.simulator.scenes import Scene, Sensor
     from lightpen_extensions.simulator.swings import paper_camera
 
@@ -395,7 +395,7 @@ def _write_set(
     if kind in ("hard", "clean"):
         write_disturbed(scene, folder, HARD if kind == "hard" else Disturbances())
     else:
-        write_plan(plan_kind(scene, kind), folder)  # type: ignore[arg-type]
+        write_set(plan_kind(scene, kind), folder)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="session")

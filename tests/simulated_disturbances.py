@@ -36,7 +36,7 @@ from lightpen_extensions.simulator.render import (
     clipped,
     disc_contours,
 )
-from lightpen_extensions.simulator.scene_files import write_plan
+from lightpen_extensions.simulator.scene_files import write_set
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import Swing, leds_in_camera
 
@@ -180,7 +180,7 @@ def write_disturbed(
 ) -> None:
     """Write a disturbed set with flags in its truth; fingers may hide LEDs."""
     plan = plan_disturbed(scene, disturbances)
-    write_plan(plan, folder)
+    write_set(plan, folder)
     file = folder / "truth.json"
     truth = json.loads(file.read_text(encoding="utf-8"))
     for frame, image_plan in zip(truth["frames"], plan.image_plans, strict=True):

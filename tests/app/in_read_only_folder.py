@@ -41,7 +41,7 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
     settings.set_last(station="Hall 2")
 
     walker = open_wizard()
-    walker.until_tells(f"The data folder {data} is not writable: the disk is")
+    walker.until_tells(f"The data folder {data} is not writable")
     walker.until_tells(WAY)
     walker.click("Close")
     walker.click("Set up station...")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
+from tests.app.walks import set_up
 
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 def test_the_data_folder_is_shown_and_chosen(
     walker: "Walker", settings: Settings, tmp_path: Path, way: str
 ) -> None:
+    set_up(walker)
     shown = [text.replace("\u200b", "") for text in walker.texts()]
     assert str(walker.workbench.folder) in shown
 

@@ -134,6 +134,9 @@ class DiscMoments(NamedTuple):
         return longer, shorter
 
 
+FLAT = 1e-3  # contrast of what has none
+
+
 class Levels(NamedTuple):
     """Intensities of windows of one bright region each, digital numbers, (N,)."""
 
@@ -143,8 +146,8 @@ class Levels(NamedTuple):
 
     @property
     def contrast(self) -> FloatArray:
-        """Plateau above the background."""
-        return self.plateau - self.background
+        """Plateau above the background, at least `FLAT`."""
+        return np.maximum(self.plateau - self.background, FLAT)
 
 
 class Discs(NamedTuple):

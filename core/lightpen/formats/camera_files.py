@@ -66,10 +66,10 @@ from lightpen.formats.camera_layouts import (
     DISTORTION,
     colmap_tree,
     foreign_intrinsics,
+    image_size_of,
     layout_of,
     mappings,
     refuse_foreign,
-    size_of,
 )
 from lightpen.formats.documents import Tree, parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
@@ -224,7 +224,11 @@ def _from_opencv(entries: Entries) -> Camera:
     lens = _lens(entries)
     matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
     return _camera(
-        entries, size_of(entries), _pinhole(matrix, entries), _distortion(entries), lens
+        entries,
+        image_size_of(entries),
+        _pinhole(matrix, entries),
+        _distortion(entries),
+        lens,
     )
 
 
@@ -236,7 +240,7 @@ def _from_kalibr(entries: Entries) -> Camera:
         )
     lens = _lens(entries)
     pinhole = entries.counted(4, "intrinsics")
-    return _camera(entries, size_of(entries), pinhole, _distortion(entries), lens)
+    return _camera(entries, image_size_of(entries), pinhole, _distortion(entries), lens)
 
 
 def _distortion(entries: Entries) -> FloatArray:

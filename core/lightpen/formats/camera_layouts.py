@@ -302,19 +302,19 @@ def _given(layout: FileLayout, entries: Entries) -> Given:
 
 def _size(paths: list[str], entries: Entries) -> tuple[float, float]:
     if not paths:
-        return size_of(entries)
+        return image_size_of(entries)
     size = np.concatenate([_numbers(entries, path) for path in paths])
     if len(size) != 2:
         raise FileError("camera-file.no-size", name=entries.name)
     return size[0], size[1]
 
 
-def size_of(entries: Entries) -> tuple[float, float]:
+def image_size_of(entries: Entries) -> tuple[float, float]:
     """Return width and height of the images, px, under their usual names."""
     if entries.has(*_SIZE) and not entries.has(*_WIDTH):
         stated = entries.value(*_SIZE)
         if isinstance(stated, dict) and "width" in stated:
-            return size_of(entries.part(*_SIZE))
+            return image_size_of(entries.part(*_SIZE))
         width, height = entries.counted(2, *_SIZE)
         return width, height
     if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):

@@ -212,7 +212,7 @@ def _matrix(header: Sequence[str]) -> ToolColumns | None:
     )
 
 
-def rotations_of(values: FloatArray) -> FloatArray:
+def matrices_of(values: FloatArray) -> FloatArray:
     """Return rotations (N, 3, 3), NaN of none.
 
     Of quaternions (N, 4), w x y z, or of rotation vectors (N, 3), rad.
@@ -272,9 +272,7 @@ def without_names(values: FloatArray, name: str) -> tuple[FloatArray, FloatArray
             candidates.append((matrices[..., :3], matrices[..., 3]))
         elif own.shape[1] == 7:
             for q, t in ((own[:, 3:], own[:, :3]), (own[:, :4], own[:, 4:])):
-                candidates += [
-                    (rotations_of(np.roll(q, turn, 1)), t) for turn in (0, 1)
-                ]
+                candidates += [(matrices_of(np.roll(q, turn, 1)), t) for turn in (0, 1)]
     good = [each for each in candidates if are_rotations(each[0])]
     if not good:
         raise FileError("poses.no-header", name=name, n_columns=values.shape[1])

@@ -24,7 +24,7 @@ from lightpen.formats.pose_columns import (
     ToolColumns,
     are_rotations,
     is_lost,
-    rotations_of,
+    matrices_of,
     tools_of,
     without_names,
 )
@@ -115,7 +115,7 @@ def _of_tool(table: Table, columns: ToolColumns, rows: list[int]) -> GivenPoses:
         rotations = own.numbers_or_none(columns.matrix).reshape(-1, 3, 3)
     else:
         places = columns.vector or columns.quaternion
-        rotations = rotations_of(own.numbers_or_none(places))
+        rotations = matrices_of(own.numbers_or_none(places))
     return _given(rotations, translations, columns.unit, table.name)
 
 

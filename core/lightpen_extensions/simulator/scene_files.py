@@ -53,10 +53,10 @@ def write_scene(
     the true ones best. Raises `FileError` if the folder is not empty or cannot be
     written.
     """
-    return write_plan(plan_scene(scene), folder, report)
+    return write_set(plan_scene(scene), folder, report)
 
 
-def write_plan(
+def write_set(
     plan: ScenePlan, folder: Path, report: Report = lambda fraction: None
 ) -> FloatArray:
     """Write the set of a plan; see `write_scene`."""

@@ -117,7 +117,7 @@ def bare_texts(node: ast.AST) -> Iterator[str]:
         case ast.Expr(value=ast.Constant()):  # a docstring
             return
         case ast.Constant(value=str() as text):
-            if WORDS.search(text) and text not in NAMES:
+            if WORDS.search(re.sub("<[^>]*>", "", text)) and text not in NAMES:
                 yield text
         case ast.JoinedStr(values=parts):
             literals = [

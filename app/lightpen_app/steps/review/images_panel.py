@@ -20,7 +20,7 @@ from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.image_table import ImageTable
-from lightpen_app.steps.review.plots_panel import framed
+from lightpen_app.steps.review.plots_panel import card_of
 from lightpen_app.steps.review.residual_plots import (
     NO_ARROWS,
     Arrows,
@@ -83,7 +83,7 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._switch = CameraSwitch()
         self._switch.hide()
         self._misfits = MisfitPlot(Axes(""))
-        self._card = framed(self._misfits)
+        self._card = card_of(self._misfits)
 
         # Layout
         self._grid = layout = grid_layout(self, margins=(0, GRID, 0, 0))

@@ -43,7 +43,7 @@ N_COLUMNS = 2  # of plots
 LEAST_HEIGHT = 25 * GRID  # px, of a plot with its title and axes
 
 
-def framed(plot: Figure) -> QFrame:
+def card_of(plot: Figure) -> QFrame:
     """Return a frame with a plot."""
     frame = QFrame()
     frame.setProperty("area", "panel")
@@ -58,7 +58,7 @@ class PlotsPanel(Translated, QWidget):
         super().__init__()
         self._solution: Solution | None = None
         self._limit: float | None = None  # of U, mm
-        self._cards = tuple(map(framed, plots))
+        self._cards = tuple(map(card_of, plots))
 
         # Layout
         self._layout = vertical_layout(self, margins=(0, GRID, 0, 0))

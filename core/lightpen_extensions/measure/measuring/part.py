@@ -276,7 +276,7 @@ def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
             if each.kind is not None
             else structs.replace(
                 each,
-                kind=recognised(each.name, kind_of(each.name, touches)),
+                kind=recognised(each.name, feature_kind_of(each.name, touches)),
                 touches=None,
             )
             for each in plan.features
@@ -315,7 +315,7 @@ def taught_plan(part: MeasuredPart) -> Plan:
     )
 
 
-def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
+def feature_kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
     """Return the kind that the touches of a feature show, if they do."""
     at = touches.of(name)
     if not len(at):

@@ -39,7 +39,7 @@ from lightpen_extensions.measure.measuring.next_touch import (
 from lightpen_extensions.measure.measuring.part import (
     CharacteristicResult,
     MeasuredPart,
-    kind_of,
+    feature_kind_of,
     measure_part,
 )
 from lightpen_extensions.measure.measuring.plan import (
@@ -139,7 +139,7 @@ def fit_of(
         return planned.kind, None
     found = [(planned.name, point) for point in points]
     touches = touches_of_part(found, Conditions(instrument))
-    kind = planned.kind or kind_of(planned.name, touches)
+    kind = planned.kind or feature_kind_of(planned.name, touches)
     try:
         return kind, None if kind is None else fit_feature(kind, touches.points_cam)
     except CalibrationError:

@@ -429,7 +429,7 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
     live.wait("All LEDs fit their table positions, in")
     with monkeypatch.context() as broken:
         broken.setattr(
-            "lightpen_app.steps.leds.match_control.match_pen", lambda *_: 1 / 0
+            "lightpen_app.steps.leds.match_panel.match_pen", lambda *_: 1 / 0
         )
         live.qtbot.waitUntil(lambda: bool(caught))
         live.qtbot.waitUntil(lambda: not cell(live, 7, MISFIT))

@@ -156,7 +156,7 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
 
     # Only the pen's scale, which moves the tip along y, cannot be found from images.
     spread = np.std(errors, axis=0) / np.std(plain, axis=0)
-    assert spread[0] < 0.7
+    assert spread[0] < 0.75  # averaged fields take a part of it
     assert spread[2] < 0.4
     # 20 draws fix a standard deviation to 16 %; led_sigma itself is found to 15 %.
     assert ((ratio > 0.5) & (ratio < 1.4)).all()
