@@ -44,7 +44,7 @@ FRAME_RATE = 5.0  # 1/s: a quarter of the usual one, as each image is rendered
 @pytest.mark.parametrize(
     ("task", "asks"),
     [(FIXED_POINT, "session.touch-cone"), (PART, "part.instruction")],
-    ids=str,
+    ids=["fixed point", "part"],
 )
 def test_a_simulated_operator_completes_a_task_without_a_key(
     task: AnyTask, asks: str
