@@ -8,8 +8,9 @@ from PySide6.QtWidgets import QLabel
 
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.look.theme import TextSize
-from lightpen_app.work.settings import FilePaths, Settings, Station
+from lightpen_app.work.settings import FilePaths, Settings, Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -35,12 +36,15 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
         "Hall 2",
         Station(
             Names("", "Ann", "LP-04", "T-10", "C-1"),
+            camera=StoredCamera(SourceChoice()),
             files=FilePaths(str(files.camera_file.path), str(files.pen_file.path)),
         ),
     )
     settings.set_last(station="Hall 2")
 
     walker = open_wizard()
+    walker.until_tells("unable to open database file")
+    walker.click("Close")
     walker.until_tells(f"The data folder {data} is not writable")
     walker.until_tells(WAY)
     walker.click("Close")

@@ -29,13 +29,14 @@ from lightpen_app.widgets.page import MainAction, Page
 
 
 class NoticeBar(Translated, QFrame):
-    """Bar for a message, hidden without one; Close hides it."""
+    """Bar for messages, hidden without one; Close shows the one before."""
 
     value_changed = Signal(str)  # its text; empty if it shows none
 
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("area", "notice")
+        self._open: dict[str, Tone] = {}  # messages not closed yet, the newest last
 
         # Widgets
         self._text = text_label(TextSize.BODY)
@@ -55,24 +56,28 @@ class NoticeBar(Translated, QFrame):
         return self._text.text()
 
     def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
-        """Say a sentence, instead of an earlier one."""
-        self._text.setText(text)
-        self._text.setAccessibleName(text)
-        set_tone(self, tone)
-        self.show()
+        """Say a sentence, before the earlier ones."""
+        self._open.pop(text, None)
+        self._open[text] = tone
+        self._show_newest()
         announce(self, text)
-        self.value_changed.emit(text)
 
     def drop(self, text: str) -> None:
         """Remove a message whose cause has ended."""
-        if self.text() == text:
-            self.clear()
+        if self._open.pop(text, None) is not None:
+            self._show_newest()
 
     def clear(self) -> None:
-        """Clear the message."""
-        self._text.clear()
-        self.hide()
-        self.value_changed.emit("")
+        """Close the message that is shown."""
+        self.drop(self.text())
+
+    def _show_newest(self) -> None:
+        text, tone = next(reversed(self._open.items()), ("", Tone.BAD))
+        self._text.setText(text)
+        self._text.setAccessibleName(text)
+        set_tone(self, tone)
+        self.setVisible(bool(text))
+        self.value_changed.emit(text)
 
 
 LONG_LEAD = 120  # letters, from which it has a row of its own

@@ -148,7 +148,7 @@ def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
     detection = detect_pen(image, preparation.camera, preparation.pen)
     image = image.copy()
     for x, y in np.rint(detection.pixels[:5]).astype(int).tolist():
-        cv2.circle(image, (x, y - 10), 3, 255, -1)  # at the rim of the disc
+        cv2.circle(image, (x, y - 14), 4, 255, -1)  # at the rim of the disc
     path.write_bytes(encode_png(image))
     spoiled = detect_pen(image, preparation.camera, preparation.pen)
     assert spoiled.has_pose

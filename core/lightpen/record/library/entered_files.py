@@ -9,7 +9,7 @@ the note in the user account. All others are not entered: they are passed over.
 import sqlite3
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from itertools import count
 from pathlib import Path
@@ -175,6 +175,7 @@ class EnteredFiles:
     data: Path
     chain: str = ""  # empty without an archive
     files: dict[str, EnteredFile] = field(default_factory=dict)  # by their places
+    owed: tuple[OwedFile, ...] = ()  # not entered yet
     station_key: str = ""  # public key that signed the last entry
 
     def place_of(self, file: Path) -> str:
@@ -202,7 +203,7 @@ class EnteredFiles:
         if entered is not None:
             found = entered.approval, entered.supervisor
             return CountedFile(place, content, *found, self.chain)
-        owed = [each for each in owed_files(self.chain) if each.place == place]
+        owed = [each for each in self.owed if each.place == place]
         for each in owed:
             if each.sha256 == digest:
                 return CountedFile(place, content, each.approval, None, self.chain)
@@ -295,7 +296,7 @@ def entered_files(data: Path) -> EnteredFiles:
         )
         if hashes and remembered_head(found.chain) is not None:
             remember_chain(data, found.chain)
-        return found
+        return replace(found, owed=owed_files(found.chain))
 
 
 def _read(data: Path) -> _Reading:

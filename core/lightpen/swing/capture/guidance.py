@@ -219,7 +219,7 @@ LEARNING_TILT = np.radians(12.0)  # shows to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
 N_MORE = 40  # images at least, where more are requested than a swing needs
 PATIENCE = 4.0  # s until a target is chosen anew, reached or not
-DECAY = 1 / 2  # U^2 less its floor goes with n^-DECAY, measured with simulated stations
+DECAY = 2 / 3  # U^2 less its floor goes with n^-DECAY, measured with simulated stations
 ENOUGH_FILLED = 0.5  # of the fields, before the lowest achievable U is reported
 
 

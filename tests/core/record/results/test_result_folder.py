@@ -22,6 +22,7 @@ from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import SpotRecord
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import with_checksum
+from lightpen.record.library.signing import OwedFile, owe, station_name
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import CALIBRATION, END, Result
 from lightpen.record.swings.header import Names
@@ -475,8 +476,11 @@ def test_a_thousand_results_of_other_pens_cost_little(archive: FolderArchive) ->
     archive.store(whole)
     archive.store(replace(whole, names=replace(NAMES, pen="LP-05")))
     content = files_of(archive)[1].read_bytes()
+    data, digest = archive.folder.parent, sha256(content).hexdigest()
     for number in range(3, 1001):
-        put_in(archive.folder.parent, archive.folder / f"{number:06d}.json", content)
+        file = archive.folder / f"{number:06d}.json"
+        owe(station_name(data), OwedFile(f"{file.parent.name}/{file.name}", digest))
+        file.write_bytes(content)
 
     start = time.process_time()
     found = in_force(archive)

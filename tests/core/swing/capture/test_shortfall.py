@@ -69,7 +69,8 @@ def to_the_right(n: int) -> Swing:
 
 @pytest.mark.slow
 def test_the_estimate_of_images_to_come_holds() -> None:
-    limit = 0.015
+    """Noise alone falls faster than at stations: the estimate is on the safe side."""
+    limit = 0.011
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=limit))
 
     def median(value: Callable[[SwingState], float], n_images: int) -> float:
@@ -78,9 +79,9 @@ def test_the_estimate_of_images_to_come_holds() -> None:
         return float(np.median([value(state) for state in states]))
 
     more = median(lambda s: measure_shortfall(setup, s).n_for_uncertainty, 60)
-    assert more > 100
+    assert more > 30
     reached = median(lambda s: s.kept.uncertainty, 60 + round(more))
-    assert reached == pytest.approx(limit, rel=0.1)
+    assert 0.75 * limit < reached < limit
 
 
 def test_the_more_of_u_is_of_the_files_the_more_images_it_takes() -> None:
@@ -91,8 +92,8 @@ def test_the_more_of_u_is_of_the_files_the_more_images_it_takes() -> None:
 
     n_needed = measure_shortfall(setup, state).n_for_uncertainty
 
-    # What is not of the files goes with the number of images to the power of -1/2.
-    of_images = (0.02**2 - 0.007**2) * (20 / (20 + n_needed)) ** 0.5
+    # What is not of the files goes with the number of images to the power of -2/3.
+    of_images = (0.02**2 - 0.007**2) * (20 / (20 + n_needed)) ** (2 / 3)
     assert np.hypot(np.sqrt(of_images), 0.007) == pytest.approx(0.012, rel=0.01)
 
 
