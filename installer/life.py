@@ -255,11 +255,12 @@ def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -
     shutil.rmtree(trial.keys, ignore_errors=True)  # which always stay
     expect_nothing_left(trial, files, registry)
 
-    trial.install()
+    again = trial.install()
     trial.data.mkdir(exist_ok=True)
     trial.settings.write_text("{}")
-    trial.uninstall("/PURGE")
-    trial.expect("the user's data go when asked", not trial.data.exists())
+    outcome = trial.uninstall("/PURGE")
+    is_gone = not trial.data.exists()
+    trial.expect("the user's data go when asked", is_gone, (again, outcome))
     expect_nothing_left(trial, files, registry)
 
 

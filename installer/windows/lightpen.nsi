@@ -88,6 +88,8 @@ VIAddVersionKey "OriginalFilename" "${NAME}-${VERSION}-setup.exe"
   !uninstfinalize '${SIGN} "%1"' = 0
 !endif
 
+!define MOST_LOOKS 20 ; at a program that is held, a quarter of a second apart
+
 !macro Refuse status text
   MessageBox MB_OK|MB_ICONSTOP "${text}" /SD IDOK
   SetErrorLevel ${status}
@@ -113,9 +115,11 @@ Function ${un}IsHeld
   ${EndIf}
 FunctionEnd
 
-; Waits until no program of the folder on the stack runs.
+; Waits until no program of the folder on the stack runs. One that has just ended, and
+; that a scanner looks at, is held for a moment longer: only then a question is asked.
 Function ${un}AwaitEnd
   Pop $R6
+  StrCpy $R5 0
   ${Do}
     Push "$R6\${EXE}"
     Call ${un}IsHeld
@@ -125,6 +129,11 @@ Function ${un}AwaitEnd
     ${EndIf}
     ${If} $R9 = 0
       ${ExitDo}
+    ${EndIf}
+    IntOp $R5 $R5 + 1
+    ${If} $R5 < ${MOST_LOOKS}
+      Sleep 250
+      ${Continue}
     ${EndIf}
     MessageBox MB_RETRYCANCEL|MB_ICONEXCLAMATION "$(IS_RUNNING)" /SD IDCANCEL IDRETRY +3
       SetErrorLevel 5
