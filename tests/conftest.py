@@ -21,7 +21,6 @@ from typing import IO, TYPE_CHECKING, Any
 import pytest
 from filelock import FileLock
 from hypothesis import settings
-from tests.simulated_centers import calibrate_pixels
 
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
@@ -29,7 +28,9 @@ if TYPE_CHECKING:
 
     from lightpen.cameras.source import SourcePlace
 
-# As the program does; NumPy reads it when it is imported.
+# As the program does; NumPy reads it when it is imported. Threads of two test processes
+# that wait for each other take several times as long.
+assert "numpy" not in sys.modules
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # No windows on the desk of whoever runs the tests; set it to see them.
@@ -479,7 +480,7 @@ def stated() -> dict[str, Any]:
     """
     import numpy as np
     from benchmarks.small_records import entries_of
-    from tests.simulated_centers import simulate_centers
+    from tests.simulated_centers import calibrate_pixels, simulate_centers
 
     from lightpen.estimation.reports.report import calibration_record
     from lightpen.formats.opened_files import InputFile, Inputs
