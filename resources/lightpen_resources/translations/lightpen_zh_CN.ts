@@ -7712,8 +7712,8 @@
         <translation>LED 布局不能确定光笔坐标系：需要十个 LED，其中 1 至 4 在 5 至 10 所在平面之后成一直线，5 至 10 排成与该直线平行的两列、每列三个，均在 {tolerance:g} mm 以内。请重新测量 LED，或以自身坐标系给出其他布局的坐标。</translation>
     </message>
     <message>
-        <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
-        <translation>图像随光笔倾斜平移 {size:.3f} px（均方根）：相机随操作员移动而转动。结果已修正，其余部分计入 U。请将相机置于脚步不会影响的稳固支架上。</translation>
+        <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen. Either the camera turns as the operator moves, or a sideways push bends the stylus. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it, and let the weight of the pen press the tip.</source>
+        <translation>图像随光笔倾斜平移 {size:.3f} px（均方根）。原因可能是相机随操作员移动而转动，或侧向推力使测针弯曲。结果已修正，其余部分计入 U。请将相机置于脚步不会影响的稳固支架上，并仅靠光笔自重压住测头。</translation>
     </message>
     <message>
         <source>The pose of camera {camera} in the rig file differs from the images by {angle:.1f}° and {distance:.0f} mm. Check that the file has cam_from_rig in millimetres (a point p of the first camera is at R p + t), that it matches the current camera positions, and that the images are in the order of its cameras; or calibrate the rig again.</source>
