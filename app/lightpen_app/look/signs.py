@@ -14,7 +14,7 @@ from PySide6.QtGui import (
     QPolygonF,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from lightpen_app.look.theme import GRID, Tone, colors_of
 
@@ -85,12 +85,16 @@ def _renderer(svg: str) -> QSvgRenderer:
 
 
 def sign_icon(widget: QWidget, sign: Sign, tone: Tone) -> QIcon:
-    """Return a sign as an icon in the colours of a widget."""
+    """Return a sign as an icon for a widget.
+
+    In the colours of the application, which a theme sets first: a style sheet reaches
+    the widgets in no certain order.
+    """
     scale = widget.devicePixelRatioF()
     picture = QPixmap(round(SIDE * scale), round(SIDE * scale))
     picture.setDevicePixelRatio(scale)
     picture.fill(Qt.GlobalColor.transparent)
-    color = colors_of(widget.palette()).tone(tone)
+    color = colors_of(QApplication.palette()).tone(tone)
     with QPainter(picture) as painter:
         draw_sign(painter, QRectF(0, 0, SIDE, SIDE), sign, color)
     return QIcon(picture)

@@ -55,7 +55,7 @@ class PushButton(QPushButton):
             self._draw_mark()
 
     def _draw_mark(self) -> None:
-        self.setIcon(sign_icon(self.window(), *self._mark))
+        self.setIcon(sign_icon(self, *self._mark))
 
     @override
     def changeEvent(self, event: QEvent) -> None:

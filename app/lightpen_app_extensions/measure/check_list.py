@@ -72,7 +72,7 @@ class CheckList(QListWidget):
             item.setData(ROW, row)
             item.setText(row.words)
             sign = StatusMessage("", row.sign, row.tone)
-            item.setIcon(sign_icon(self.window(), sign.sign, sign.tone))
+            item.setIcon(sign_icon(self, sign.sign, sign.tone))
         self.blockSignals(False)
 
     def show_row(self, index: int) -> None:
