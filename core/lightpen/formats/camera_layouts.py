@@ -235,6 +235,7 @@ _REMEDIES = {
     "of-project": message("camera-file.of-project"),
     "of-pair": message("camera-file.of-pair"),
     "other-file": message("camera-file.other-file"),
+    "no-intrinsics": message("camera-file.no-intrinsics"),
 }
 
 

@@ -46,6 +46,7 @@ FOLDER = message("file.folder")
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a message
 
 _DEVICES = r"(?i:con|prn|aux|nul|com[0-9\u00b9\u00b2\u00b3]|lpt[0-9\u00b9\u00b2\u00b3])"
+_CHINESE = rb"([\xb0-\xf7][\xa1-\xfe]){2}"  # two characters, in GB 2312 and later
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
 _DENIED = message("write.denied")
 _REASONS = {
@@ -100,8 +101,8 @@ def opened(path: Path, what: Message, limit: int) -> Iterator[BinaryIO]:
 def read_text(path: Path, what: Message, limit: int) -> str:
     r"""Return a text file as `read_bytes`, with ``\n`` at the line ends.
 
-    UTF-8 with or without byte order mark, UTF-16 with one, and Windows-1252, which
-    old instruments write in comments.
+    UTF-8 with or without byte order mark, UTF-16 with one, and GB 18030 or
+    Windows-1252, which old instruments write in comments.
     """
     data = read_bytes(path, what, limit)
     if kind := kind_of(data):
@@ -303,7 +304,7 @@ def _decode(data: bytes) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode("cp1252")
+        return data.decode("gb18030" if re.search(_CHINESE, data) else "cp1252")
 
 
 def _replace(target: Path, data: bytes) -> None:

@@ -11,7 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import foreign_program
+from lightpen.formats.files import foreign_program, quoted
 from lightpen.formats.tables import Table, is_workbook, number_flaw
 from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
@@ -22,11 +22,11 @@ LARGEST_DIAMETER = 100.0  # mm
 LARGEST_DEVIATION = 0.5  # mm, of a coordinate
 NORMAL_TOLERANCE = 0.01  # of the length of a normal in the file
 _SPELLINGS = {
-    "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres"),
-    "cm": ("cm",),
-    "m": ("m", "meter", "metre", "meters", "metres"),
-    "um": ("um", "μm", "micron", "microns"),
-    "inch": ("inch", "in", "inches"),
+    "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres", "毫米"),
+    "cm": ("cm", "厘米"),
+    "m": ("m", "meter", "metre", "meters", "metres", "米"),
+    "um": ("um", "μm", "micron", "microns", "微米"),
+    "inch": ("inch", "in", "inches", "英寸"),
 }
 UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in names}
 LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
@@ -127,9 +127,9 @@ _OF_PLAN = r"(nominal|nom|sollwert|soll)"
 _COLUMN = (
     rf"(?:{_ACTUAL}[\s_-]+|{_OF_PLAN}[\s_-]+)?"
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
-    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value|wert))?"
+    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value|wert|坐标|轴|值))?"
     rf"(?:[\s_-]*{_ACTUAL}|[\s_-]*{_OF_PLAN})?"
-    r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
+    r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ毫厘微米英寸]+)\s*[\])]?)?"
 )
 _OTHER_COORDINATE = r"[xyz]\b(?! nominal|.*(tol|dev|diff|abw|err|sigma|std))"
 
@@ -225,6 +225,10 @@ def _in_number_order(table: Table, column: int) -> Table:
     numbered = [cell for cell in cells if not cell or re.search(r"(?a)\d$", cell)]
     if not numbered and len(set(cells)) == len(cells):
         return table
+    others = [i for i, cell in enumerate(cells) if re.fullmatch(r"\D+", cell)]
+    if numbered and others:
+        cell = quoted(cells[others[0]])
+        raise table.error(others[0], message("pen-file.no-led", cell=cell))
     numbers = table.whole_numbers(column)
     if number_flaw(cells[0]) and numbers.min() == 0:
         numbers += 1

@@ -34,10 +34,15 @@ _UNIT = (
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
+_ROTATING |= {"四元数", "旋转", "姿态"}
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
+_MOVING |= {"平移", "位置", "坐标"}
 _SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}
 _VECTORS = {"rvec", "rotvec", "rodrigues"}
-_ANGLE = r"(euler_?|rot_?)?(roll|pitch|yaw|r?[xyz]|[abc])([\W_]+(deg|rad)\w*\W?)?"
+_ANGLE = (
+    r"((euler_?|rot_?)?(r?[xyz]|[abc])|(.*[\W_])?(r[xyz]|roll|pitch|yaw|omega|phi|kappa"
+    r"|alpha|beta|gamma|eta|theta|psi|azimuth|elevation))([\W_]+(deg|rad)\w*\W?)?"
+)
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
 STATE = r".*(state|status|valid|visible|visibility|tracked|tracking|\bok|_ok\b).*"
 _FLAG = r"valid|visib|track|ok\b"  # 0 says no; as a state, it may say that all is well
@@ -80,6 +85,8 @@ def tools_of(table: Table) -> list[ToolColumns]:
     if matrix is not None:
         return [matrix]
     known = [i for i, role in enumerate(roles) if role is not None]
+    if not known and _has_angles(table):
+        raise FileError("poses.angles", name=table.name)
     if not known:
         return []
     first = roles[known[0]]
@@ -117,8 +124,8 @@ def _role(name: str, tools: Container[str] = ()) -> _Role | None:
     stated = re.search(_UNIT, name)
     base = re.sub(_UNIT, "", name).strip()
     unit = UNITS[UNIT_NAMES[stated[1]]] if stated and stated[1] else None
-    stem, axis = re.sub(r"[^a-z0-9]+$", "", base[:-1]), base[-1:]
-    words = set(re.findall(r"[a-z]+", stem))
+    stem, axis = re.sub(r"[\W_]+$", "", base[:-1]), base[-1:]
+    words = set(re.findall(r"[a-z]+|[一-龥]+", stem))
     tool = re.sub(r"[\W_]*(" + "|".join(_ROTATING | _MOVING) + r")$", "", stem)
     if words & _VECTORS and axis in {*"xyz"}:
         return _Role("v", axis, unit, tool)
@@ -148,8 +155,8 @@ def _tool(
     vector = [places.get(("v", axis)) for axis in "xyz"]
     translation = [places.get(("t", axis)) for axis in "xyz"]
     if None in translation or (None in quaternion and None in vector):
-        angles = [name for name in table.header if re.fullmatch(_ANGLE, name)]
-        if None not in translation and (None not in quaternion[1:] or len(angles) > 2):
+        is_turned = None not in quaternion[1:] or _has_angles(table)
+        if None not in translation and is_turned:
             raise FileError("poses.angles", name=table.name)
         return None
     role = roles[translation[0] or 0]
@@ -163,6 +170,10 @@ def _tool(
         state=state[0] if state else None,
         unit=None if role is None else role.unit,
     )
+
+
+def _has_angles(table: Table) -> bool:
+    return sum(bool(re.fullmatch(_ANGLE, name)) for name in table.header) > 2
 
 
 def _is_bare(table: Table, column: int) -> bool:

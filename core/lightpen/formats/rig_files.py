@@ -24,6 +24,7 @@ none of them state how well that is known, by
 """
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,7 @@ from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, is_covariance
 from lightpen.formats.files import (
     MEGABYTE,
+    foreign_program,
     is_simulated,
     quoted,
     read_text,
@@ -87,9 +89,13 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     copy.
     """
     name = printable(path.name)
-    entries = Entries.of(
-        parse_document(read_text(path, RIG_FILE, RIG_FILE_LIMIT), name), name
-    )
+    text = read_text(path, RIG_FILE, RIG_FILE_LIMIT)
+    program = foreign_program(text.encode(), "rigs")[0]
+    if program or not re.search(r"\bcameras\b", text):
+        program = program or foreign_program(text.encode(), "cameras")[0]
+        kind = program or message("file.other-kind")
+        raise FileError("rig-file.foreign", name=name, program=kind)
+    entries = Entries.of(parse_document(text, name), name)
     entries.refuse_others("cameras", "comment")
     listed = _listed_cameras(entries, name)
     names = _names(listed, name)

@@ -46,7 +46,12 @@ NOTHING = frozenset(
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
-_COMMENT = "#%"  # of MATLAB, too
+_COMMENT = r"\s*(?:[#%]|//)"  # of MATLAB and C++, too
+# Full-width characters, and minus signs that are not of ASCII.
+_PLAIN = {0xFF01 + i: 0x21 + i for i in range(94)} | {0x2212: "-", 0x2013: "-"}
+_FORTRAN = r"(?a)(?<=\d)[dD](?=[+-]\d)"  # the E of a number
+_X = r"\bx(\b|_)"
+FEWEST_EQUAL = 0.5  # of the lines of a table, as long as the first
 _CELL = r"[^\s;,]"  # lines of a spreadsheet may have none
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
@@ -199,7 +204,7 @@ def read_table(path: Path, what: Message, limit: int) -> Table:
 
     The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
     have decimal commas unless the comma separates columns. Blank lines and lines that
-    begin with ``#`` are skipped. A first line without numbers is a header.
+    begin with ``#`` or ``//`` are skipped. A first line without numbers is a header.
     """
     return parse_table(table_text(path, what, limit), printable(path.name))
 
@@ -256,6 +261,8 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     """
     if re.match(_JSON, text):
         raise FileError("table.json", name=name)
+    text = text if text.isascii() else text.translate(_PLAIN)
+    text = re.sub(_FORTRAN, "e", text)
     lines = _filled_lines(text, name)
     separator = _separator([line for _, line in lines])
     hint = re.fullmatch(r"sep=([;,\t|])\s*", lines[0][1])  # of Excel, to itself
@@ -282,8 +289,10 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         number = numbers.pop(0)
         if not is_foreign:
             _check_header(header, number, name)
-    elif is_foreign or separator is not None:
+    else:
         header = _header_in_comment(text, separator, len(rows[0]))
+        if separator is None and not is_foreign and not re.search(_X, " ".join(header)):
+            header = ()  # a sentence of as many words
     if not rows:
         raise FileError("table.only-header", name=name)
     return Table(name, header, rows, numbers)
@@ -299,7 +308,9 @@ def _n_titles(rows: list[list[str]]) -> int:
     filled = [len(row) - row.count("") for row in rows]
     usual = sorted(filled)[len(filled) // 2]
     n_titles = next(i for i, count in enumerate(filled) if 2 * count > usual)
-    return 0 if any(map(_looks_numeric, rows[n_titles])) else n_titles
+    if any(map(_looks_numeric, rows[n_titles])) and rows[0] != [str(len(rows) - 1)]:
+        return 0  # unless they count the lines below
+    return n_titles
 
 
 def _moment(cell: str) -> str:
@@ -317,9 +328,9 @@ def _header_in_comment(
     """Return the names of the last comment before the data, if it has as many."""
     header: tuple[str, ...] = ()
     for line in text.split("\n"):
-        if line.strip() and line.lstrip()[0] not in _COMMENT:
+        if line.strip() and not re.match(_COMMENT, line):
             break
-        cells = [c.strip() for c in line.strip().lstrip("#% ").split(separator)]
+        cells = [c.strip() for c in line.strip().lstrip("#%/ ").split(separator)]
         header = tuple(cell.casefold() for cell in cells) if line.strip() else header
     return header if len(header) == length else ()
 
@@ -363,7 +374,7 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     lines = [
         (number, line)
         for number, line in enumerate(text.split("\n"), 1)
-        if re.search(_CELL, line) and line.lstrip()[0] not in _COMMENT
+        if re.search(_CELL, line) and not re.match(_COMMENT, line)
     ]
     if not lines:
         raise FileError("table.only-comments", name=name)
@@ -418,13 +429,15 @@ def _check_lengths(
     rows: list[list[str]], numbers: list[int], separator: str | None, name: str
 ) -> None:
     expected = len(rows[0])
+    n_equal = sum(len(row) == expected for row in rows)
     for number, row in zip(numbers, rows, strict=True):
         if len(row) != expected:
-            hint = (
-                message("table.decimal-commas")
-                if separator == "," and len(row) > expected
-                else message("table.short-line")
-            )
+            if separator == "," and len(row) > expected:
+                hint = message("table.decimal-commas")
+            elif n_equal < FEWEST_EQUAL * len(rows):
+                hint = message("table.none")
+            else:
+                hint = message("table.short-line")
             raise FileError(
                 "table.line-lengths",
                 line=number,

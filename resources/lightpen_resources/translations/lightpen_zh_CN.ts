@@ -5060,12 +5060,20 @@
         <translation>输入/输出错误</translation>
     </message>
     <message>
+        <source>It holds no intrinsics: choose the file that the calibration of the camera wrote, or calibrate it with a board.</source>
+        <translation>其中没有内参：请选择相机标定写出的文件，或用标定板标定相机。</translation>
+    </message>
+    <message>
         <source>Its folder does not exist. Create the folder, or choose another.</source>
         <translation>所在文件夹不存在。请创建文件夹，或选择其他文件夹。</translation>
     </message>
     <message>
         <source>Its folder is not a folder. Check the path.</source>
         <translation>所在位置不是文件夹。请检查路径。</translation>
+    </message>
+    <message>
+        <source>Its lines differ, so that it is no table. Export the data as one, with the same columns in each line.</source>
+        <translation>各行不同，因此不是表格。请将数据导出为表格，每行的列相同。</translation>
     </message>
     <message>
         <source>Keep the tip in the cone for a moment. The program then learns your position.</source>
@@ -5764,6 +5772,10 @@
         <translation>每幅图像一行的表格</translation>
     </message>
     <message>
+        <source>another kind</source>
+        <translation>其他类型</translation>
+    </message>
+    <message>
         <source>ball centre</source>
         <translation>球心</translation>
     </message>
@@ -5942,6 +5954,10 @@
     <message>
         <source>{cell} is no number or time of a frame: up to 19 digits, 9 of them behind the decimal point.</source>
         <translation>{cell} 不是帧的编号或时间：最多 19 位数字，其中小数点后 9 位。</translation>
+    </message>
+    <message>
+        <source>{cell} is the name of no LED, which ends in its number here. Remove the line, or number the LED.</source>
+        <translation>{cell} 不是 LED 的名称：此处的名称以编号结尾。请删除该行，或给 LED 编号。</translation>
     </message>
     <message>
         <source>{count}, run {run} of {n_runs}</source>
@@ -6158,6 +6174,10 @@
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that this is the right file.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
+    </message>
+    <message>
+        <source>{name} is no rig file as it is read here, but of {program}. Write the intrinsics of each camera to its own file, and name these, the rotations and the translations in mm in a rig file: see Help, Rig files.</source>
+        <translation>{name} 不是此处可读取的相机组文件，而是 {program} 的文件。请将每台相机的内参写入单独的文件，并在相机组文件中写明这些文件、旋转和以 mm 为单位的平移：见“帮助”中的“相机组文件”。</translation>
     </message>
     <message>
         <source>{name} is not a supported image (PNG, JPEG, BMP, TIFF, PGM, WebP). Save the images as PNG or TIFF, or copy it again.</source>

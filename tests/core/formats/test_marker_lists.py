@@ -201,7 +201,8 @@ def test_nominal_coordinates_alone_are_taken(tmp_path: Path) -> None:
         ([f"LED{i}" for i in (1, 3, 2, 4, 5, 6, 7, 8, 9, 11)], "LED 11 stands"),
         (["LED1", *[f"LED{i}" for i in range(1, 10)]], "listed already"),
         (["A", "A", *"CDEFGHIJ"], "not a number"),
-        (["A", "LED2", *"CDEFGHIJ"], "not a number"),
+        (["A", "LED2", *"CDEFGHIJ"], '"A" is the name of no LED'),
+        ([*(f"LED{i}" for i in range(1, 10)), "mean"], "Remove the line"),
     ],
 )
 def test_names_of_leds_are_their_order(
@@ -308,6 +309,14 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
         ("[geometry]\n[fiducial0]\nx=1\ny=2\nz=3\n", "Atracsys"),
         ("ply\nformat ascii 1.0\nelement vertex 4\n", "PLY"),
         ("solid pen\n facet normal 0 0 1\n", "STL"),
+        ("DIM LOC1= LOCATION OF CIRCLE LED1  UNITS=MM\nAX NOMINAL\n", "PC-DMIS"),
+        ("planid\tpartnb\tid\ttype\tactual\n1\t1\tLED1\tx\t2\nEND\n", "Calypso"),
+        ("% mm\nleds = [ ...\n 1 2 3; ...\n];\n", "MATLAB"),
+        ("!MKR#2\n[Autolabel]\n$Pen_LED1_X = 3\n", "Vicon"),
+        ("K0100 30\nK2002/1 LED1 X\n", "Q-DAS"),
+        ("Punkt;R (mm);Phi (°);Z (mm)\n1;2;3;4\n", "polar"),
+        ("# .PCD v0.7\nFIELDS x y z\n", "PCD"),
+        ("<html><table><tr><td>LED1</td></tr></table></html>", "a web page"),
         ("# Markups fiducial file version = 4.11\n1,2,3,4\n", "3D Slicer"),
     ],
 )
@@ -345,6 +354,34 @@ def test_the_first_column_names_the_points_whatever_its_title(tmp_path: Path) ->
     path.write_text("Merkmal;x_mm;y_mm;z_mm\n" + "".join(rows))
 
     np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "header"),
+    [
+        ("gbk", "编号,X坐标(mm),Y坐标(mm),Z坐标(mm)"),
+        ("utf-8-sig", "灯号，X（毫米），Y（毫米），Z（毫米）"),  # noqa: RUF001
+        ("utf-16", "LED,X轴,Y轴,Z轴\n,毫米,毫米,毫米"),
+        ("cp1252", "Größe öß,X [mm],Y [mm],Z [mm]"),
+    ],
+)
+def test_headers_in_other_languages_are_read(
+    tmp_path: Path, encoding: str, header: str
+) -> None:
+    rows = [f"{i},{x},{y},{z}\n" for i, (x, y, z) in enumerate(LEDS, 1)]
+    path = tmp_path / "leds.csv"
+    path.write_bytes((header + "\n" + "".join(rows)).encode(encoding))
+
+    np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+
+
+@pytest.mark.parametrize("head", ["# x_mm y_mm z_mm", "//X Y Z\n10"])
+def test_the_head_of_a_point_cloud_is_no_row(tmp_path: Path, head: str) -> None:
+    rows = [f"{x} {y} {z}\n" for x, y, z in LEDS]
+    path = saved(tmp_path, f"{head}\n" + "".join(rows))
+    units = None if "mm" in head else "mm"
+
+    np.testing.assert_array_equal(read_pen(path, units=units).leds, LEDS)
 
 
 def test_coordinates_alone_are_leds_in_their_order(tmp_path: Path) -> None:

@@ -47,6 +47,11 @@ def scalar_last() -> list[str]:
     return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
 
 
+def in_chinese() -> list[str]:
+    header = "帧\t四元数x\t四元数y\t四元数z\t四元数w\t平移x(mm)\t平移y(mm)\t平移z(mm)"
+    return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
+
+
 def scalar_first() -> list[str]:
     header = "time\tqw\tqx\tqy\tqz\ttx_mm\tty_mm\ttz_mm"
     quaternions = np.roll(QUATERNIONS, 1, axis=1)
@@ -77,7 +82,7 @@ def named_by_tool() -> list[str]:
 @pytest.mark.parametrize(
     "lines",
     [
-        *(scalar_last, scalar_first, tum, matrices, vectors, named_by_tool),
+        *(in_chinese, scalar_last, scalar_first, tum, matrices, vectors, named_by_tool),
         lambda: ndi(["OK"] * N_POSES),
     ],
 )
@@ -180,6 +185,11 @@ def test_a_pose_that_a_flag_calls_invalid_is_left_out(
         (b"\x02\x50" + bytes(500), "C3D"),
         (b"NO_OF_FRAMES\t80\nNO_OF_BODIES\t1\n", "Qualisys"),
         (b"header:\n  seq: 1\npose:\n  position:\n    x: 1\n", "ROS"),
+        (b"At time 159.1\n- Translation: [1, 2, 3]\n", "tf_echo"),
+        (b"0.0 INFO LOG a\n0.1 T20 POSE 1 2 3 1 0 0 0\n", "libsurvive"),
+        (b"01 01+08499+00123-00044+00022+012345-004567-140000+00012\n", "NDI"),
+        (b"poses:\n  - x: 1\n    y: 2\n", "YAML"),
+        (b"HIERARCHY\nROOT pen\n", "BVH"),
         (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
     ],
 )
@@ -194,7 +204,11 @@ def test_poses_in_a_form_that_is_not_read_are_named(
 
 
 @pytest.mark.parametrize(
-    "angles", ["rx,ry,rz", "roll,pitch,yaw", "roll_deg,pitch_deg,yaw_deg", "a,b,c"]
+    "angles",
+    [
+        *("rx,ry,rz", "roll,pitch,yaw", "roll_deg,pitch_deg,yaw_deg", "a,b,c"),
+        *("Pen Rz,Pen Ry,Pen Rx", "omega,phi,kappa"),
+    ],
 )
 def test_angles_are_refused_by_name(tmp_path: Path, angles: str) -> None:
     path = tmp_path / "poses.csv"

@@ -117,6 +117,28 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("cam0:\n  resolution: [9, 9]\ncam1:\n  T_cn_cnm1:\n  - [1, 0]\n", "Kalibr"),
+        ('[cam_0]\nname = "a"\n\n[cam_1]\nname = "b"\n', "anipose"),
+        ('[{"cameras": [{"ref_sensor": true}]}]', "COLMAP"),
+        ('{"value0": {"T_imu_cam": [], "intrinsics": []}}', "Basalt"),
+        ("%YAML:1.0\n---\nR: 1\nT: 2\nR1: !!opencv-matrix\n", "OpenCV"),
+        ('{"CameraParameters1": {}, "CameraParameters2": {}}', "a stereo pair"),
+        ('<Cameras><Camera DEVICEID="1"/><Camera DEVICEID="2"/></Cameras>', "Vicon"),
+        ("image_width: 9\n", "another kind"),
+    ],
+)
+def test_a_rig_of_another_program_is_named(
+    tmp_path: Path, text: str, program: str
+) -> None:
+    path = tmp_path / "rig.txt"
+    path.write_text(text)
+
+    assert re.search(f"of {program}.* see Help, Rig files", refusal(path))
+
+
+@pytest.mark.parametrize(
     ("edit", "words"),
     [
         (setting("intrinsics", "gone.yaml"), "right: .*gone.yaml does not exist"),

@@ -105,7 +105,6 @@ def test_a_letter_in_a_number_is_named_with_its_line() -> None:
         ("1_000", "not a number"),
         ("l2", "not a number"),
         ("1 000", "not a number"),
-        ("\N{MINUS SIGN}3", "not a number"),
         ("\N{ARABIC-INDIC DIGIT ONE}2", "not a number"),
         ("0x10", "not a number"),
         ("--1", "not a number"),
@@ -116,6 +115,28 @@ def test_a_letter_in_a_number_is_named_with_its_line() -> None:
 def test_what_is_not_a_number_is_named(cell: str, flaw: str) -> None:
     with pytest.raises(FileError, match=f"^Line 3 of t.csv: .*{flaw}"):
         parse_table(f'led;x\n1;2\n3;"{cell}"\n', "t.csv").numbers([0, 1])
+
+
+@pytest.mark.parametrize(
+    ("cell", "number"),
+    [
+        ("\N{MINUS SIGN}3", -3.0),
+        ("\N{EN DASH}0,5", -0.5),
+        ("\uff11\uff0e\uff15", 1.5),
+        ("-2.5D-01", -0.25),
+        ("1.25d+2", 125.0),
+    ],
+)
+def test_numbers_of_word_processors_and_fortran_are_read(
+    cell: str, number: float
+) -> None:
+    assert parse_table(f"1;{cell}\n2;{cell}\n", "t.csv").numbers([1])[0] == number
+
+
+def test_lines_of_a_report_are_no_table() -> None:
+    text = refusal("led,x,y\n1\n2,3\nDIM 3\n1,2,3\n")
+    assert text.startswith("Line 2 of lp04_leds.csv has 1 cells where line 1 has 3.")
+    assert "no table" in text
 
 
 def test_points_and_commas_are_not_mixed() -> None:
