@@ -128,9 +128,13 @@ def read_text(path: Path, what: Message, limit: int) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def kind_of(data: bytes) -> str:
-    """Return the kind of a file that is not read here, from its start, or ``""``."""
-    return foreign_program(data[:HEAD])[0]
+def kind_of(data: bytes, name: str = "") -> str:
+    """Return the kind of a file that is not read here, or ``""``.
+
+    It is told by its start, and for images by the end of its ``name`` before.
+    """
+    named = foreign_program(name.lower().encode(), "names")[0] if name else ""
+    return named or foreign_program(data[:HEAD])[0]
 
 
 def foreign_program(data: bytes, content: str = "any") -> tuple[str, str]:

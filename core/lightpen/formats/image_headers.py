@@ -83,7 +83,7 @@ def damaged_image(name: str | Message) -> FileError:
 
 def _unknown_image(start: bytes, name: str | Message) -> FileError:
     """Return the error of a file that is of another kind, or damaged."""
-    kind = kind_of(start)
+    kind = kind_of(start, str(name))
     if len(start) < SHORTEST_IMAGE:
         return cut_off_image(name)
     if not kind:

@@ -28,7 +28,7 @@ from lightpen.formats.decoding import (
     opened_image,
     read_image,
 )
-from lightpen.formats.files import opened, unreadable
+from lightpen.formats.files import HEAD, kind_of, opened, unreadable
 from lightpen.formats.image_headers import (
     JPEG_SCAN,
     PNG_SIGNATURE,
@@ -233,6 +233,7 @@ VIDEO_SUFFIXES = (
     *(".ogv", ".mxf", ".vob", ".f4v"),
 )
 IMAGE_FOLDER = "images"
+SAID = 5  # files or folders in a folder without images that are looked at
 IN_FLIGHT = 4  # images per thread that may wait in memory
 LOOKED_AT_FIRST = 4  # images, whether they are raw ones of a colour camera
 WORK_MEMORY = 250_000_000  # bytes that all threads take
@@ -417,15 +418,24 @@ def _images_at(path: Path, where: str) -> ImageSource:
 
 def _without_images(folder: Path, where: str) -> FileError:
     """Return the error that names what a folder has instead of images."""
-    others = sorted(file.name for file in folder.iterdir() if file.is_file())
+    inside = sorted(folder.iterdir())
+    others = [file for file in inside if file.is_file()]
+    if inside and not others:
+        inner = ", ".join(printable(each.name) for each in inside[:SAID])
+        return FileError("images.only-folders", folder=printable(where), inner=inner)
     if not others:
         return FileError("images.empty-folder", folder=printable(where))
+    name, kind = others[0].name, others[0].suffix or "?"
+    for file in reversed(others[:SAID]):
+        with file.open("rb") as stream:
+            if known := kind_of(stream.read(HEAD), file.name):
+                name, kind = file.name, known
     return FileError(
         "images.only-others",
         folder=printable(where),
-        suffixes=", ".join(SUFFIXES),
         count=len(others),
-        name=printable(others[0]),
+        name=printable(name),
+        kind=kind,
     )
 
 

@@ -1,11 +1,12 @@
 """Tables of LED centres and poses measured by other programs.
 
 LED centres have the columns ``frame,led,x_px,y_px``; those of unknown LEDs have
-``frame,x_px,y_px``. A frame has a number, or a time of up to 9 decimals. LEDs that were
-not seen may be left out, or have empty cells, NaN, (0, 0) or (-1, -1). Poses have the
-row-major rotation
-``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen. A
-column ``pose`` with the number of each is optional; further columns are not read.
+``frame,x_px,y_px``. A frame has a number, or a time of up to 9 decimals. A table may
+also have a line for each frame with columns such as ``x1,y1,x2,y2`` or
+``led1_x,led1_y``. LEDs that were not seen may be left out, or have empty cells, NaN,
+(0, 0) or (-1, -1). Poses have the row-major rotation ``r11,r12,r13,r21,...,r33`` and
+the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen. A column ``pose`` with the number
+of each is optional; further columns are not read.
 Without a header the columns stand in this order, with the number first if there is one.
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import HEAD, MEGABYTE, quoted, read_bytes
+from lightpen.formats.files import HEAD, MEGABYTE, foreign_program, quoted, read_bytes
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
     SEQUENCE_SUFFIXES,
@@ -45,17 +46,27 @@ from lightpen.model.rigid import nearest_rotation
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
+FEWEST_COLUMNS = 2  # x and y of LEDs, in a table with a line for each frame
 MANY_CENTERS = 20  # as no program lists only in the corner of an image
 LARGEST_TRANSLATION = 1e6  # mm
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
 
 _FRAME = (
-    *("frame", "image", "frame_id", "image_id", "frame_number", "frame_no"),
-    *("time", "timestamp", "timestamp_ns", "time_s", "t", "image_name", "filename"),
+    *("frame", "frame_id", "frame_number", "frame_no", "frame_nr", "frame_index"),
+    *("frame_idx", "image", "image_id", "img", "image_name", "filename", "time"),
+    *("timestamp", "timestamp_ns", "timestamp_ms", "time_s", "time_ms", "t"),
 )
-_LED = ("led", "led_id", "marker", "marker_id", "id")
-_PIXEL = (("x_px", "x", "u_px", "u"), ("y_px", "y", "v_px", "v"))
+_LED = (
+    *("led", "led_id", "led_no", "marker", "marker_id", "point", "point_id"),
+    *("point_index", "target", "track_id", "particle", "name", "id"),
+)
+_PIXEL = (
+    ("x_px", "x", "u_px", "u", "position_x", "center_x", "cx", "column", "col"),
+    ("y_px", "y", "v_px", "v", "position_y", "center_y", "cy", "row"),
+)
+_OF_LED = r"(?:led|marker|point|pt|p|m)?[ _.:-]*(\d+)"  # in a column's name
+_WIDE = rf"(?a)(?:{_OF_LED}[ _.:-]*([xy])|([xy])[ _.:-]*{_OF_LED})(_px| *[\[(].*)?"
 _LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"
 _CENTERS = (_FRAME, _LED, *_PIXEL)
 _UNLABELLED = (_FRAME, *_PIXEL)
@@ -102,7 +113,7 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     Raises `FileError`, which names the line, for LEDs that the pen does not have, an
     LED twice in a frame, or cells that are not numbers.
     """
-    table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
+    table = _long(_table_of_centers(path))
     columns = table.columns(_CENTERS, message("table.of-centers"))
     table = _numbered(_with_leds(table, columns), columns[1])
     frame_of_row = table.moments(columns[0])
@@ -124,6 +135,39 @@ def read_centers(path: Path, n_leds: int) -> Centers:
             name=table.name,
         )
     return Centers(frames, grid, path, remark)
+
+
+def _table_of_centers(path: Path) -> Table:
+    """Read a table without lines of units; refuse the file of a program by its name."""
+    what, name = message("file.centers"), printable(path.name)
+    data = read_bytes(path, what, OBSERVATION_FILE_LIMIT)
+    program = foreign_program(data[:HEAD], "centers")[0]
+    if program and not is_workbook(data):
+        raise FileError("centers.foreign", name=name, program=program)
+    table = read_table(path, what, OBSERVATION_FILE_LIMIT)
+    is_text = [not re.search(r"\d", "".join(row)) for row in table.rows]
+    first = is_text.index(False) if False in is_text else 0
+    return table.only(range(first, len(table.rows)))
+
+
+def _long(table: Table) -> Table:
+    """Return a table with a line for each LED, also if it has columns of each LED."""
+    places = {
+        (named[2] or named[3], int(named[1] or named[4])): i
+        for i, column in enumerate(table.header)
+        if (named := re.fullmatch(_WIDE, column))
+    }
+    leds = [led for axis, led in places if axis == "x" and ("y", led) in places]
+    if len(leds) < FEWEST_COLUMNS:
+        return table
+    (frame,) = table.columns([_FRAME], message("table.of-centers"))
+    rows = [
+        [row[frame], str(led), row[places["x", led]], row[places["y", led]]]
+        for row in table.rows
+        for led in leds
+    ]
+    lines = [line for line in table.lines for _ in leds]
+    return Table(table.name, (), rows, lines)
 
 
 def _with_leds(table: Table, columns: list[int]) -> Table:
@@ -151,7 +195,7 @@ def _numbered(table: Table, column: int) -> Table:
 
 def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
     """Read centres of unknown LEDs; see the module for the layout."""
-    table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
+    table = _table_of_centers(path)
     columns = table.columns(_UNLABELLED, message("table.of-centers"))
     frame_of_row = table.moments(columns[0])
     pixels = _seen_pixels(table, columns[1:])

@@ -26,20 +26,11 @@ DECIMALS = 9  # of times
 LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
 FEWEST_CELLS = 3  # of a row of a table in a workbook
 NOTHING = frozenset(
-    {
-        "",
-        "nan",
-        "na",
-        "n/a",
-        "#n/a",
-        "#nv",
-        "none",
-        "null",
-        "-",
-        "--",
-        "missing",
-        *("inf", "-inf", "infinity"),
-    }
+    (
+        *("", "nan", "na", "n/a", "n.a.", "#n/a", "#nv", "none", "null", "missing"),
+        *("-", "--", ".", "?", "inf", "-inf", "infinity", "-nan", "nan(ind)"),
+        *("-nan(ind)", "1.#qnan", "1.#qnan0", "-1.#ind", "-1.#ind00"),
+    )
 )
 
 # No digit can match in two ways, so that mismatches are found without backtracking.
@@ -57,7 +48,7 @@ _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
 _LED_NAME = r"(?a)^[^\W\d_].*?(?=\d+$)"
 _FRAME_NAME = r"(?a)[^\W\d].*?(\d+)(\.[a-z]+)?"
-_DATE = r"(?a)\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?"
+_DATE = r"(?a)(\d{4}-\d\d-\d\d[T ])?(\d\d:\d\d:\d\d([.,]\d+)?)Z?"
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,11 +305,12 @@ def _n_titles(rows: list[list[str]]) -> int:
 
 
 def _moment(cell: str) -> str:
-    """Return the number of a frame, also of ``frame_017.png`` or a date."""
+    """Return the number of a frame, also of ``frame_017.png``, a date or a time."""
     if named := re.fullmatch(_FRAME_NAME, cell):
         return named[1]
-    if re.fullmatch(_DATE, cell):
-        return str(np.datetime64(cell.rstrip("Z"), "ns").astype(np.int64))
+    if dated := re.fullmatch(_DATE, cell):
+        instant = (dated[1] or "1970-01-01T") + dated[2].replace(",", ".")
+        return str(np.datetime64(instant, "ns").astype(np.int64))
     return cell.replace(",", ".")
 
 

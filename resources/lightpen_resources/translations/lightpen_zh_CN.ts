@@ -5544,10 +5544,6 @@
         <translation>文件夹 {folder} 中没有文件。请选择包含图像的文件夹。</translation>
     </message>
     <message>
-        <source>The folder {folder} contains no images ({suffixes}), but other files ({count}, the first of them {name}). Choose the folder with the images, or a video itself; save images of another format as PNG.</source>
-        <translation>文件夹 {folder} 中没有图像（{suffixes}），但有其他文件（{count} 个，第一个是 {name}）。请选择包含图像的文件夹，或直接选择视频文件；其他格式的图像请保存为 PNG。</translation>
-    </message>
-    <message>
         <source>The header of {name} asks players to turn its frames by {degrees} degrees. This is not applied: the frames are used as stored, which must be the orientation that the intrinsics file was made for.</source>
         <translation>{name} 的文件头要求播放器把画面旋转 {degrees} 度。程序不执行这一旋转：画面按存储的方向使用，内参文件必须是在这一方向上标定的。</translation>
     </message>
@@ -6146,6 +6142,10 @@
     <message>
         <source>{name} is a camera of {program} with the lens model {model}, which cannot be read. {remedy}</source>
         <translation>{name} 是 {program} 的相机，镜头模型为 {model}，无法读取。{remedy}</translation>
+    </message>
+    <message>
+        <source>{name} is a file of the kind {program}, from which no LED centres are read. Write them as a table with the header frame,led,x_px,y_px and a line for each LED in each frame.</source>
+        <translation>{name} 是 {program} 类型的文件，无法从中读取 LED 中心。请写成表格：表头为 frame,led,x_px,y_px，每幅图像中的每个 LED 一行。</translation>
     </message>
     <message>
         <source>{name} is a file of the kind {program}, whose markers cannot be read. Write them as a table: led,x_mm,y_mm,z_mm.</source>
@@ -7422,6 +7422,14 @@
     <message>
         <source>The folder {folder} cannot be read: {reason}. Its interrupted swings are not listed. Check the read permission.</source>
         <translation>文件夹 {folder} 无法读取：{reason}。其中未完成的摆动不会列出；请确认您有读取权限。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} contains no images that are read, but other files ({count}). {name} is of the kind {kind}. Save its images as PNG or TIFF, under names that end so, or choose a video itself.</source>
+        <translation>文件夹 {folder} 中没有可读取的图像，但有其他文件（{count} 个）。{name} 是 {kind} 类型的文件。请将其中的图像保存为 PNG 或 TIFF，并使用相应的扩展名；视频请直接选择文件本身。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} contains no images, but folders: {inner}. Choose the one with the images.</source>
+        <translation>文件夹 {folder} 中没有图像，但有文件夹：{inner}。请选择包含图像的那一个。</translation>
     </message>
     <message>
         <source>The folder {folder} is not empty. Choose another folder for this swing; nothing is overwritten.</source>

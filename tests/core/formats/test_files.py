@@ -134,6 +134,8 @@ def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
         ("1,2".encode("utf-16-le"), "line 1 contains the control character 0"),
         (b"\x89PNG\r\n\x1a\n", "a file of the kind image, which is not read"),
         (b"#ROSBAG V2.0\n", "a file of the kind ROS bag"),
+        (b"PAR1\x15\x04", "a file of the kind Parquet"),
+        (b"ARROW1\0\0", "a file of the kind Arrow"),
         (b"ISO-10303-21;\nHEADER;", "a file of the kind STEP"),
         (b"\xef\xbb\xbf<!DOCTYPE html>\n<html>", "HTML"),
         (b"\x81\x8d", "byte 1 matches no known encoding"),

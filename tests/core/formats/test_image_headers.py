@@ -78,7 +78,10 @@ def test_a_format_whose_size_is_not_known_here_is_refused() -> None:
 @pytest.mark.parametrize(
     ("data", "kind"),
     [
-        (b"\0\0\0\x1cftypavif" + bytes(100), "HEIC, AVIF"),
+        (b"\0\0\0\x1cftypavif" + bytes(100), "AVIF"),
+        (b"\0\0\0\x18ftypmif1" + bytes(100), "HEIC"),
+        (b"\0\0\0\x1cftypisom" + bytes(100), "video"),
+        (b"\xd4\xc3\xb2\xa1\2\0\4\0" + bytes(100), "network capture"),
         (b"GIF89a" + bytes(100), "GIF"),
         (b"v/1\x01" + bytes(100), "OpenEXR"),
         (b"SIMPLE  =                    T" + bytes(100), "FITS"),

@@ -494,7 +494,32 @@ def test_images_without_tag_need_no_remark(folder: Path) -> None:
 def test_a_folder_without_images_says_what_it_has(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="contains no files"):
         find_images(str(tmp_path))
-    (tmp_path / "swing.avi").write_bytes(b"RIFF")
+    (tmp_path / "cam0").mkdir()
+    with pytest.raises(FileError, match=r"folders: cam0\. Choose"):
+        find_images(str(tmp_path))
 
-    with pytest.raises(FileError, match=r"first of them swing\.avi.*a video itself"):
+
+@pytest.mark.parametrize(
+    ("name", "start", "kind"),
+    [
+        ("swing.avi", b"RIFF\0\0\0\0AVI ", "video"),
+        ("f1.heic", b"\0\0\0\x18ftypheic", "HEIC"),
+        ("f1.fits", b"SIMPLE  =     T", "FITS"),
+        ("f1.dng", b"II*\0\x08\0\0\0", "camera raw"),
+        ("f1.NEF", b"MM\0*\0\0\0\x08", "camera raw"),
+        ("f1.raw", bytes(100), "pixels without a header"),
+        ("swing.cih", b"#Camera Information Header", "Photron"),
+        ("frame_1", b"\x89PNG\r\n\x1a\n", "image"),
+        ("f1.xyz", b"something", r"\.xyz"),
+    ],
+)
+def test_a_folder_of_files_of_another_kind_names_it(
+    tmp_path: Path, name: str, start: bytes, kind: str
+) -> None:
+    (tmp_path / "a notes.txt").write_text("swing 3", encoding="utf-8")
+    (tmp_path / name).write_bytes(start)
+    if name == "f1.xyz":
+        (tmp_path / "a notes.txt").unlink()
+
+    with pytest.raises(FileError, match=rf"{name} is of the kind {kind}.*a video"):
         find_images(str(tmp_path))

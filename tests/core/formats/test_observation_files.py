@@ -68,10 +68,16 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         ),
         (HEADER, "a_07.png,LED1,1.5,2.5", "a_02.png,LED1,3,4", "a_07.png,LED3,5,6"),
         (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
+        ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
+        ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
+        ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
+        ("frame_index,particle,y,x", "7,1,2.5,1.5", "2,1,4,3", "7,3,6,5"),
+        ("frame,led,x,y", "[-],[-],[px],[px]", "7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
     ],
     ids=[
         *("header", "no header", "other order", "more columns"),
         *("of a spreadsheet", "of MATLAB", "names", "a frame without LEDs"),
+        *("a line for a frame", "names in front", "with units", "of trackpy", "units"),
     ],
 )
 def test_centres_are_sorted_by_frame_and_led(
@@ -89,7 +95,10 @@ def test_centres_are_sorted_by_frame_and_led(
 
 @pytest.mark.parametrize(
     "unseen",
-    ["-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999", "inf,inf"],
+    [
+        *("-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999"),
+        *("inf,inf", "-nan(ind),-nan(ind)", "-nan,-nan", "1.#QNAN,1.#QNAN"),
+    ],
 )
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
     tmp_path: Path, unseen: str
@@ -126,12 +135,39 @@ def test_json_is_named_where_a_table_is_read(tmp_path: Path) -> None:
     assert "is JSON" in refusal_of_centers(tmp_path, '[{"frame": 1, "leds": []}]')
 
 
+@pytest.mark.parametrize(
+    ("start", "program"),
+    [
+        ('<?xml version="1.0"?>\n<TrackMate version="7">', "TrackMate"),
+        ("<Kinovea>", "XML"),
+        ("NO_OF_FRAMES\t60", "Qualisys"),
+        ("Format Version,1.23,Take Name,a", "Motive"),
+        ("Trajectories\n100\n,,Pen:1,,", "Vicon"),
+        ("# Image list with two lines of data per image:", "COLMAP"),
+        ("pt1_cam1_X,pt1_cam1_Y\n1,2", "DLTdv"),
+        ("mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n", "Tracker"),
+        (" ,Area,Mean,X,Y,Slice\n1,1340,200,5,6,1", "ImageJ"),
+        ("- frame: 1\n  leds:\n", "YAML"),
+    ],
+)
+def test_centres_of_other_programs_are_named(
+    tmp_path: Path, start: str, program: str
+) -> None:
+    refusal = refusal_of_centers(tmp_path, start)
+    assert f"of the kind {program}" in refusal
+    assert "a table with the header frame,led,x_px,y_px" in refusal
+
+
 def test_times_are_frames(tmp_path: Path) -> None:
     nanoseconds = ("1764380000123456789", "1764380000123456790")
     rows = [f"{each},1,2,3" for each in nanoseconds]
     assert len(read_centers(saved(tmp_path, HEADER, *rows), 3).frames) == 2
 
     rows = [f"2024-03-01T12:00:0{each},1,2,3" for each in ("0.25Z", "1.5Z")]
+    frames = read_centers(saved(tmp_path, HEADER, *rows), 3).frames
+    assert frames[1] - frames[0] == 1_250_000_000
+
+    rows = [f"12:00:0{each},1,2,3" for each in ("0.25", "1.5")]
     frames = read_centers(saved(tmp_path, HEADER, *rows), 3).frames
     assert frames[1] - frames[0] == 1_250_000_000
 
