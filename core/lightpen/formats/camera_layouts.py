@@ -314,7 +314,7 @@ def image_size_of(entries: Entries) -> tuple[float, float]:
     """Return width and height of the images, px, under their usual names."""
     if entries.has(*_SIZE) and not entries.has(*_WIDTH):
         stated = entries.value(*_SIZE)
-        if isinstance(stated, dict) and "width" in stated:
+        if isinstance(stated, dict) and "data" not in stated:
             return image_size_of(entries.part(*_SIZE))
         width, height = entries.counted(2, *_SIZE)
         return width, height

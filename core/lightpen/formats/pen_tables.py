@@ -124,12 +124,14 @@ _NOMINAL = " nominal"
 _NORMALS = (("nx",), ("ny",), ("nz",))
 _ACTUAL = r"(?:actual|act|measured|meas|istwert|ist)"
 _OF_PLAN = r"(nominal|nom|sollwert|soll)"
+_PLACE = r"(?:pos(?:ition)?|[ck]oord(?:inate)?|坐标)"
 _COLUMN = (
     rf"(?:{_ACTUAL}[\s_-]+|{_OF_PLAN}[\s_-]+)?"
+    rf"(?:{_PLACE}[\s_.-]*)?"
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
-    r"(?:[\s_-]*(?:coord(?:inate)?|koord(?:inate)?|value|wert|坐标|轴|值))?"
+    rf"(?:[\s_.-]*(?:{_PLACE}|value|wert|轴|值))?"
     rf"(?:[\s_-]*{_ACTUAL}|[\s_-]*{_OF_PLAN})?"
-    r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ毫厘微米英寸]+)\s*[\])]?)?"
+    r"(?:[\s_/,]*(?:in\s+)?(?:[\[(]\s*)?([^\W\d_]+)\s*[\])]?)?"
 )
 _OTHER_COORDINATE = r"[xyz]\b(?! nominal|.*(tol|dev|diff|abw|err|sigma|std))"
 

@@ -75,6 +75,8 @@ class _Role:
 
 def tools_of(table: Table) -> list[ToolColumns]:
     """Return the tools that the header of a table names."""
+    if any(re.fullmatch(r"(.*[\W_])?q(uat\w*)?_?4", name) for name in table.header):
+        return []  # the first of four or the last is w
     roles = _roles(table.header)
     for name, role in zip(table.header, roles, strict=True):
         stated = re.search(_UNIT, name)
@@ -123,6 +125,7 @@ def _roles(header: Sequence[str]) -> list[_Role | None]:
 def _role(name: str, tools: Container[str] = ()) -> _Role | None:
     stated = re.search(_UNIT, name)
     base = re.sub(_UNIT, "", name).strip()
+    base = re.sub(r"^([xyz])[\W_]+(pos|trans|[ck]oord|坐标|位置)\w*$", r"t_\1", base)
     unit = UNITS[UNIT_NAMES[stated[1]]] if stated and stated[1] else None
     stem, axis = re.sub(r"[\W_]+$", "", base[:-1]), base[-1:]
     words = set(re.findall(r"[a-z]+|[一-龥]+", stem))

@@ -24,7 +24,6 @@ none of them state how well that is known, by
 """
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,11 +89,8 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     """
     name = printable(path.name)
     text = read_text(path, RIG_FILE, RIG_FILE_LIMIT)
-    program = foreign_program(text.encode(), "rigs")[0]
-    if program or not re.search(r"\bcameras\b", text):
-        program = program or foreign_program(text.encode(), "cameras")[0]
-        kind = program or message("file.other-kind")
-        raise FileError("rig-file.foreign", name=name, program=kind)
+    if program := foreign_program(text.encode(), "rigs")[0]:
+        raise FileError("rig-file.foreign", name=name, program=program)
     entries = Entries.of(parse_document(text, name), name)
     entries.refuse_others("cameras", "comment")
     listed = _listed_cameras(entries, name)

@@ -5092,8 +5092,8 @@
         <translation>LED 中心</translation>
     </message>
     <message>
-        <source>LED {led} is listed already on line {line}.</source>
-        <translation>LED {led} 已在第 {line} 行列出。</translation>
+        <source>LED {led} is listed already on line {line}. Keep the right one, or of a recording one image.</source>
+        <translation>LED {led} 已在第 {line} 行列出。请保留正确的一行；若为录制数据，请只保留一幅图像。</translation>
     </message>
     <message>
         <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; its weight is reduced accordingly. Clean it, and check its brightness and its supply.</source>
@@ -5766,10 +5766,6 @@
     <message>
         <source>a table with a row for each image</source>
         <translation>每幅图像一行的表格</translation>
-    </message>
-    <message>
-        <source>another kind</source>
-        <translation>其他类型</translation>
     </message>
     <message>
         <source>ball centre</source>

@@ -349,6 +349,10 @@ GYROFLOW: dict[str, Any] = {
             {"mtx": MATRIX, "dist_coeff": [BROWN], "img_size": SIZE_NAMED},
             id="size by names",
         ),
+        pytest.param(
+            {"mtx": MATRIX, "dist": BROWN, "ImageSize": {"Width": 1280, "Height": 720}},
+            id="size by capitalised names",
+        ),
     ],
 )
 def test_one_camera_is_the_same_in_all_layouts(
@@ -524,6 +528,11 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("<BlocksExchange version='3.2'></BlocksExchange>", "ContextCapture"),
         ("['area_scan_division', 0.016, -450, 3.45e-06]", "Halcon"),
         ("Camera: a\n C    16.002  mm\n XP    -0.012  mm\n", "Australis"),
+        ("<root><!-- vpCameraParameters --><camera/></root>", "ViSP"),
+        ("Left:\n('D = ', [-0.3])\n('K = ', [1512.1])\n", "ROS"),
+        ("[Versions]\nueye_api_64.dll=4.95.0000\n", "It holds no intrinsics"),
+        ("[Lens]\nNumber=3\nMaker=Acme\nFocus=16.0\n", "INI"),
+        ({"camera_angle_x": 0.5, "mtx": MATRIX, "dist": BROWN}, "image size"),
         ({"camera_angle_x": 0.5, "frames": []}, "It holds no intrinsics"),
         ("# {05D8C294-F295-4DFB-9D01-096BD04049F4}\nWidth\t9\n", "GenICam"),
         ("1 4638.2 2448 2048 1219.6 1031.3 1 -0.08 0.1 0 0 0\n", "Argus"),

@@ -312,6 +312,7 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
         ("DIM LOC1= LOCATION OF CIRCLE LED1  UNITS=MM\nAX NOMINAL\n", "PC-DMIS"),
         ("planid\tpartnb\tid\ttype\tactual\n1\t1\tLED1\tx\t2\nEND\n", "Calypso"),
         ("% mm\nleds = [ ...\n 1 2 3; ...\n];\n", "MATLAB"),
+        ('unit = "mm"\n[markers]\nLED1 = [1, 2, 3]\n', "TOML"),
         ("!MKR#2\n[Autolabel]\n$Pen_LED1_X = 3\n", "Vicon"),
         ("K0100 30\nK2002/1 LED1 X\n", "Q-DAS"),
         ("Punkt;R (mm);Phi (°);Z (mm)\n1;2;3;4\n", "polar"),
@@ -362,6 +363,8 @@ def test_the_first_column_names_the_points_whatever_its_title(tmp_path: Path) ->
         ("gbk", "编号,X坐标(mm),Y坐标(mm),Z坐标(mm)"),
         ("utf-8-sig", "灯号，X（毫米），Y（毫米），Z（毫米）"),  # noqa: RUF001
         ("utf-16", "LED,X轴,Y轴,Z轴\n,毫米,毫米,毫米"),
+        ("ascii", "LED,X in mm,Y in mm,Z in mm"),
+        ("ascii", "LED,Pos_X[mm],Pos_Y[mm],Pos_Z[mm]"),
         ("cp1252", "Größe öß,X [mm],Y [mm],Z [mm]"),
     ],
 )

@@ -52,6 +52,13 @@ def in_chinese() -> list[str]:
     return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
 
 
+def in_german() -> list[str]:
+    places = "X-Position\tY-Position\tZ-Position"
+    header = f"Zeit\tQuat x\tQuat y\tQuat z\tQuat w\t{places}"
+    units = "s" + 5 * "\t" + "mm\tmm\tmm"
+    return [header, units, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
+
+
 def scalar_first() -> list[str]:
     header = "time\tqw\tqx\tqy\tqz\ttx_mm\tty_mm\ttz_mm"
     quaternions = np.roll(QUATERNIONS, 1, axis=1)
@@ -82,7 +89,16 @@ def named_by_tool() -> list[str]:
 @pytest.mark.parametrize(
     "lines",
     [
-        *(in_chinese, scalar_last, scalar_first, tum, matrices, vectors, named_by_tool),
+        *(
+            in_german,
+            in_chinese,
+            scalar_last,
+            scalar_first,
+            tum,
+            matrices,
+            vectors,
+            named_by_tool,
+        ),
         lambda: ndi(["OK"] * N_POSES),
     ],
 )
@@ -189,6 +205,7 @@ def test_a_pose_that_a_flag_calls_invalid_is_left_out(
         (b"0.0 INFO LOG a\n0.1 T20 POSE 1 2 3 1 0 0 0\n", "libsurvive"),
         (b"01 01+08499+00123-00044+00022+012345-004567-140000+00012\n", "NDI"),
         (b"poses:\n  - x: 1\n    y: 2\n", "YAML"),
+        (b"Pose 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "matrices"),
         (b"HIERARCHY\nROOT pen\n", "BVH"),
         (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
     ],
@@ -215,6 +232,14 @@ def test_angles_are_refused_by_name(tmp_path: Path, angles: str) -> None:
     path.write_text(f"{angles},tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n")
 
     with pytest.raises(FileError, match=r"quaternions or matrices; name .* rvec_x"):
+        read_poses(path)
+
+
+def test_four_numbered_components_are_no_known_quaternion(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    path.write_text("q1,q2,q3,q4,x,y,z\n0,0,0,1,4,5,6\n")
+
+    with pytest.raises(FileError, match="no columns of poses that are known"):
         read_poses(path)
 
 

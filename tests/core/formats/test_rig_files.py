@@ -126,7 +126,8 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         ("%YAML:1.0\n---\nR: 1\nT: 2\nR1: !!opencv-matrix\n", "OpenCV"),
         ('{"CameraParameters1": {}, "CameraParameters2": {}}', "a stereo pair"),
         ('<Cameras><Camera DEVICEID="1"/><Camera DEVICEID="2"/></Cameras>', "Vicon"),
-        ("image_width: 9\n", "another kind"),
+        ('{"cameras": [{"name": "left", "K": [[1]]}]}', "another program"),
+        ("image_width: 9\n", "another program"),
     ],
 )
 def test_a_rig_of_another_program_is_named(
