@@ -230,7 +230,7 @@ SUFFIXES = (
 VIDEO_SUFFIXES = (
     *(".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm"),
     *(".mjpeg", ".mjpg", ".ts", ".mts", ".m2ts", ".wmv", ".flv", ".y4m", ".3gp"),
-    *(".ogv", ".mxf", ".vob", ".f4v"),
+    *(".ogv", ".mxf", ".vob", ".f4v", ".h264", ".264", ".h265", ".hevc"),
 )
 IMAGE_FOLDER = "images"
 SAID = 5  # files or folders in a folder without images that are looked at
@@ -364,8 +364,6 @@ def image_files(files: list[Path]) -> ImageSource:
 
 def _pages(file: Path) -> Sequence[PagePlace | FileError | None]:
     """Return the pages of a TIFF, or its fault; None for the image of other formats."""
-    if file.suffix.lower() not in TIFF_SUFFIXES:
-        return [None]
     try:
         with opened_image(file) as stream:
             is_stack = is_tiff(stream.read(4))
@@ -441,7 +439,8 @@ def _without_images(folder: Path, where: str) -> FileError:
 
 def _image_files_in(folder: Path) -> list[Path]:
     files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
-    return [file for file in files if file.name[0] not in ".~"]  # hidden, or open
+    hidden = ".~"  # or open in another program
+    return [file for file in files if file.name[0] not in hidden and not file.is_dir()]
 
 
 def _video(path: Path) -> ImageSource:

@@ -216,7 +216,7 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     pixels = table.numbers_or_none(columns)
     # Programs write (0, 0), (-1, -1), (-9999, -9999) for centres that they lack.
     x, y = pixels.T
-    nothing = (x == y) & (x <= 0) & (x == np.round(x))
+    nothing = (x == y) & (x <= 0) & (x == np.round(x)) | (x == -1) | (y == -1)
     seen = np.where((nothing | np.isnan(x + y))[:, None], np.nan, pixels)
     is_share = np.nanmax(seen, initial=0) <= 1 and np.nanmin(seen, initial=1) >= 0
     if is_share and len(seen) > MANY_CENTERS:

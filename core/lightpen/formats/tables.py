@@ -46,9 +46,9 @@ FEWEST_EQUAL = 0.5  # of the lines of a table, as long as the first
 _CELL = r"[^\s;,]"  # lines of a spreadsheet may have none
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
-_LED_NAME = r"(?a)^[^\W\d_].*?(?=\d+$)"
-_FRAME_NAME = r"(?a)[^\W\d].*?(\d+)(\.[a-z]+)?"
-_DATE = r"(?a)(\d{4}-\d\d-\d\d[T ])?(\d\d:\d\d:\d\d([.,]\d+)?)Z?"
+_LED_NAME = r"(?a)^(#|[^\W\d_]).*?(?=\d+$)"
+_FRAME_NAME = r"(?a)[/.~\\]*[^\W\d].*?(\d+)(\.[a-z]+)?"
+_DATE = r"(?a)(\d{4}-\d\d-\d\d[T ])?(\d\d:\d\d:\d\d([.,]\d+)?)(Z|[+-]\d\d:?\d\d)?"
 
 
 @dataclass(frozen=True, eq=False)

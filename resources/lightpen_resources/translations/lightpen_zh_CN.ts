@@ -5948,6 +5948,10 @@
         <translation>{cell} 不是帧的编号或时间：最多 19 位数字，其中小数点后 9 位。</translation>
     </message>
     <message>
+        <source>{cell} is not a number. Correct it, or leave out what is not known.</source>
+        <translation>{cell} 不是数字。请改正，未知的值请留空。</translation>
+    </message>
+    <message>
         <source>{cell} is the name of no LED, which ends in its number here. Remove the line, or number the LED.</source>
         <translation>{cell} 不是 LED 的名称：此处的名称以编号结尾。请删除该行，或给 LED 编号。</translation>
     </message>
@@ -6530,10 +6534,6 @@
     <message>
         <source>{cell} is not a finite number.</source>
         <translation>{cell} 不是有限数。</translation>
-    </message>
-    <message>
-        <source>{cell} is not a number.</source>
-        <translation>{cell} 不是数字。</translation>
     </message>
     <message>
         <source>{cell} is not a whole number.</source>

@@ -491,6 +491,20 @@ def test_images_without_tag_need_no_remark(folder: Path) -> None:
     assert find_images(str(folder)).remark() is None
 
 
+@pytest.mark.parametrize("name", ["swing.tif", "swing.png"])
+def test_pages_are_read_whatever_the_name_of_their_file(
+    tmp_path: Path, name: str
+) -> None:
+    data = cv2.imencodemulti(".tif", [GREY, GREY // 2])[1]
+    (tmp_path / name).write_bytes(data.tobytes())
+    (tmp_path / "folder.png").mkdir()
+
+    found = find_images(str(tmp_path))
+
+    assert found.names == ("swing page 1", "swing page 2")
+    np.testing.assert_array_equal(list(found.open())[1](), GREY // 2)
+
+
 def test_a_folder_without_images_says_what_it_has(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="contains no files"):
         find_images(str(tmp_path))
@@ -507,6 +521,7 @@ def test_a_folder_without_images_says_what_it_has(tmp_path: Path) -> None:
         ("f1.fits", b"SIMPLE  =     T", "FITS"),
         ("f1.dng", b"II*\0\x08\0\0\0", "camera raw"),
         ("f1.NEF", b"MM\0*\0\0\0\x08", "camera raw"),
+        ("f1.jls", b"\xff\xd8\xff\xf7", "JPEG-LS"),
         ("f1.raw", bytes(100), "pixels without a header"),
         ("swing.cih", b"#Camera Information Header", "Photron"),
         ("frame_1", b"\x89PNG\r\n\x1a\n", "image"),

@@ -67,6 +67,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             "0,7,3,5,6",
         ),
         (HEADER, "a_07.png,LED1,1.5,2.5", "a_02.png,LED1,3,4", "a_07.png,LED3,5,6"),
+        (HEADER, "/a/07.png,#1,1.5,2.5", "/a/02.png,#1,3,4", "/a/07.png,#3,5,6"),
         (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
         ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
@@ -76,7 +77,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
     ],
     ids=[
         *("header", "no header", "other order", "more columns"),
-        *("of a spreadsheet", "of MATLAB", "names", "a frame without LEDs"),
+        *("of a spreadsheet", "of MATLAB", "names", "paths", "a frame without LEDs"),
         *("a line for a frame", "names in front", "with units", "of trackpy", "units"),
     ],
 )
@@ -98,6 +99,7 @@ def test_centres_are_sorted_by_frame_and_led(
     [
         *("-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999"),
         *("inf,inf", "-nan(ind),-nan(ind)", "-nan,-nan", "1.#QNAN,1.#QNAN"),
+        "-1,200",
     ],
 )
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
@@ -148,6 +150,9 @@ def test_json_is_named_where_a_table_is_read(tmp_path: Path) -> None:
         ("mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n", "Tracker"),
         (" ,Area,Mean,X,Y,Slice\n1,1340,200,5,6,1", "ImageJ"),
         ("- frame: 1\n  leds:\n", "YAML"),
+        ("[[frame]]\nn = 1\n", "TOML"),
+        ("[[1.3e+03 1.6e+03]\n [1.4e+03 1.3e+03]]", "numpy"),
+        ("centers = [\n 1 1 2 3;\n];", "MATLAB"),
     ],
 )
 def test_centres_of_other_programs_are_named(
@@ -163,7 +168,7 @@ def test_times_are_frames(tmp_path: Path) -> None:
     rows = [f"{each},1,2,3" for each in nanoseconds]
     assert len(read_centers(saved(tmp_path, HEADER, *rows), 3).frames) == 2
 
-    rows = [f"2024-03-01T12:00:0{each},1,2,3" for each in ("0.25Z", "1.5Z")]
+    rows = [f"2024-03-01T12:00:0{each},1,2,3" for each in ("0.25Z", "1.5+01:00")]
     frames = read_centers(saved(tmp_path, HEADER, *rows), 3).frames
     assert frames[1] - frames[0] == 1_250_000_000
 
