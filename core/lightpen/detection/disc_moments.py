@@ -134,7 +134,7 @@ class DiscMoments(NamedTuple):
         return longer, shorter
 
 
-FLAT = 1e-3  # contrast of what has none
+LEAST_CONTRAST = 1e-3  # of what has none
 
 
 class Levels(NamedTuple):
@@ -146,8 +146,8 @@ class Levels(NamedTuple):
 
     @property
     def contrast(self) -> FloatArray:
-        """Plateau above the background, at least `FLAT`."""
-        return np.maximum(self.plateau - self.background, FLAT)
+        """Plateau above the background, at least `LEAST_CONTRAST`."""
+        return np.maximum(self.plateau - self.background, LEAST_CONTRAST)
 
 
 class Discs(NamedTuple):
