@@ -358,6 +358,8 @@ def _of_document(tree: Tree, units: str | None, name: str) -> PenContent:
     markers = None
     if not (isinstance(tree, dict) and "leds" in tree):
         markers = markers_of(tree, name)
+    if markers is None and isinstance(tree, dict) and "leds" not in tree:
+        raise FileError("pen-file.no-led-list", name=name)
     if markers is None:
         return from_json(tree, units, name)
     stated = ""

@@ -30,7 +30,7 @@ FEW_POSES = 4
 UNIT_TOLERANCE = 0.01  # of the length of a quaternion
 
 _UNIT = (
-    rf"(?:(?:[\s_.]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
+    rf"(?:(?:[\s_./]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}

@@ -41,9 +41,8 @@ _COMMENT = r"\s*(?:[#%]|//)"  # of MATLAB and C++, too
 # Full-width characters, and minus signs that are not of ASCII.
 _PLAIN = {0xFF01 + i: 0x21 + i for i in range(94)} | {0x2212: "-", 0x2013: "-"}
 _FORTRAN = r"(?a)(?<=\d)[dD](?=[+-]\d)"  # the E of a number
-_X = r"\bx(\b|_)"
 FEWEST_EQUAL = 0.5  # of the lines of a table, as long as the first
-_CELL = r"[^\s;,]"  # lines of a spreadsheet may have none
+_CELL = r"[^\s;,|=+:-]"  # lines of a spreadsheet and rules have none
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
 _LED_NAME = r"(?a)^(#|[^\W\d_]).*?(?=\d+$)"
@@ -282,7 +281,11 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
             _check_header(header, number, name)
     else:
         header = _header_in_comment(text, separator, len(rows[0]))
-        if separator is None and not is_foreign and not re.search(_X, " ".join(header)):
+        if (
+            separator is None
+            and not is_foreign
+            and not re.search(r"\bx(\b|_)", " ".join(header))
+        ):
             header = ()  # a sentence of as many words
     if not rows:
         raise FileError("table.only-header", name=name)
@@ -364,7 +367,7 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     if text.count("\n") > MAX_LINES:
         raise FileError("table.too-many-lines", name=name, most=MAX_LINES)
     lines = [
-        (number, line)
+        (number, line.strip(" |"))
         for number, line in enumerate(text.split("\n"), 1)
         if re.search(_CELL, line) and not re.match(_COMMENT, line)
     ]
@@ -375,7 +378,7 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
 
 def _separator(lines: list[str]) -> str | None:
     """Return the column separator of most lines; None for blanks."""
-    for candidate in (";", "\t", ","):
+    for candidate in (";", "\t", "|", ","):
         if 2 * sum(candidate in line for line in lines) > len(lines):
             return candidate
     return None

@@ -517,6 +517,8 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("p = cameraParameters('K', [1 0 0], 'ImageSize', [9 9]);", "MATLAB"),
         ({"CameraParameters1": {}, "CameraParameters2": {}}, "a stereo pair"),
         (f"<o><M1 type_id='opencv-matrix'>{MATRIX}</M1></o>", "a stereo pair"),
+        ({"cameraMatrixL": MATRIX, "cameraMatrixR": MATRIX}, "a stereo pair"),
+        ({"K_left": MATRIX, "K_right": MATRIX}, "a stereo pair"),
         ("Camera: {fx: 435}\nStereoRectifier:\n  model: fisheye\n", "a stereo pair"),
         ("calib_time: 09-Jan-2012\nK_00: 984 0 690 0 980 233 0 0 1\n", "KITTI"),
         ("%YAML:1.0\nnames:\n  - '1'\nK_1: !!opencv-matrix\n", "EasyMocap"),

@@ -292,6 +292,12 @@ def test_a_flaw_of_a_list_is_named(
     assert fault in refusal(tmp_path, text)
 
 
+def test_lists_for_each_axis_are_told_the_form(tmp_path: Path) -> None:
+    text = json.dumps({"unit": "mm", **dict(zip("xyz", LEDS.T.tolist(), strict=True))})
+
+    assert "is no list of LEDs. Write it as" in refusal(tmp_path, text)
+
+
 def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
     path = tmp_path / "8700339.rom"
     path.write_bytes(b"NDI\x00\x92\x1e\x00\x00\x01" + bytes(743))

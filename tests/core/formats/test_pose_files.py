@@ -134,12 +134,13 @@ def test_few_rows_that_fit_another_order_by_chance_do_not_decide(
 
 
 @pytest.mark.parametrize(
-    ("unit", "size"), [("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)]
+    ("unit", "size"),
+    [(" [cm]", 10.0), (" [m]", 1000.0), (" [in]", 25.4), (" [um]", 1e-3), ("/mm", 1.0)],
 )
 def test_the_unit_of_translations_is_that_of_their_names(
     tmp_path: Path, unit: str, size: float
 ) -> None:
-    names = ["qx", "qy", "qz", "qw", *(f"t{axis} [{unit}]" for axis in "xyz")]
+    names = ["qx", "qy", "qz", "qw", *(f"t{axis}{unit}" for axis in "xyz")]
     path = tmp_path / "poses.tsv"
     lines = ["\t".join(names), *rows(QUATERNIONS, MOVED / size)]
     path.write_text("\n".join(lines) + "\n")

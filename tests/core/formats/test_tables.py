@@ -140,6 +140,21 @@ def test_lines_of_a_report_are_no_table() -> None:
     assert "no table" in text
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "| led | x |\n|-----|---:|\n| 1 | 2 |\n| 3 | 4 |\n",
+        "led   x\n---------\n  1   2\n  3   4\n",
+        "led;x\n=====;=====\n1;2\n3;4\n",
+    ],
+)
+def test_rules_of_tables_are_no_rows(text: str) -> None:
+    table = parse_table(text, "t.md")
+
+    assert table.header == ("led", "x")
+    assert table.numbers([0, 1]).tolist() == [[1, 2], [3, 4]]
+
+
 def test_points_and_commas_are_not_mixed() -> None:
     text = refusal("led;x\n1;2.5\n2;3\n3;1,234\n")
     assert text.startswith("Line 4 of lp04_leds.csv: the file has decimal points and")
