@@ -89,7 +89,7 @@ def test_a_computation_that_is_cancelled_leaves_what_was_found_before(
     run.start()
     qtbot.waitUntil(lambda: run.state.n_images >= 20 and not run.state.is_capturing)
     found = random_station(6, 60).discovered()
-    run.take(found)
+    run.adopt(found)
     before = run.state
     module = "lightpen_app_extensions.discover.discovery_run"
     may_begin = hold_back(f"{module}.discover")

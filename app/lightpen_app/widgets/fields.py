@@ -156,10 +156,10 @@ class PathField(QWidget):
         last = Path(self._last)
         if self._last and last.parent.is_dir():
             dialog.setDirectory(str(last if last.is_dir() else last.parent))
-        dialog.fileSelected.connect(self.take)
+        dialog.fileSelected.connect(self.accept)
         dialog.open()
 
-    def take(self, path: str) -> None:
+    def accept(self, path: str) -> None:
         """Take over a path as if it were typed."""
         self.set_value(path)
         self.value_changed.emit(path)
@@ -177,11 +177,11 @@ class PathField(QWidget):
     def _on_return_pressed(self) -> None:
         """Accept the typed path; consume Enter, which the window uses otherwise."""
         if self.edit.isModified() or self._is_faulty:
-            self.take(self._typed())
+            self.accept(self._typed())
 
     def _on_editing_finished(self) -> None:
         if self._typed() != self._value:
-            self.take(self._typed())
+            self.accept(self._typed())
 
 
 Named = QWidget | QAction | QStandardItemModel

@@ -165,7 +165,7 @@ class LastChoices:
 
     station: str = ""
     export_folder: str = ""  # results are saved in it
-    hidden_columns: tuple[int, ...] = ()  # of the table of History
+    hidden_columns: tuple[str, ...] = ()  # of the table of History, their keys
     laboratory: Laboratory | None = None  # named by a certificate
 
 

@@ -47,7 +47,7 @@ def load(file: Path) -> LoadedSettings:
     try:
         return LoadedSettings(_read(file))
     except DamagedError:
-        return LoadedSettings({}, _set_aside(file))
+        return LoadedSettings({}, _moved_away(file))
     except FileError as error:
         return LoadedSettings({}, error.message)
 
@@ -70,7 +70,7 @@ def save(file: Path, content: Content, changes: Changes) -> Message | None:
                 try:
                     content = with_changes(_read(file), changes)
                 except DamagedError:
-                    fault = _set_aside(file)
+                    fault = _moved_away(file)
             write_whole(file, json.dumps(content, ensure_ascii=True, indent=1).encode())
             sync_folder(file.parent)
     except OSError as error:
@@ -83,7 +83,7 @@ def _read(file: Path) -> Content:
     return parse_own_json(read_bytes(file, WHAT, LIMIT), dict[str, dict[str, Any]])
 
 
-def _set_aside(file: Path) -> Message:
+def _moved_away(file: Path) -> Message:
     aside = file.with_name(f"{file.name}.damaged")
     with suppress(OSError):  # it is reported all the same
         file.replace(aside)

@@ -259,7 +259,7 @@ class BoardCapture(QObject):
         """Stop capturing; captured views are kept."""
         self._become(replace(self._state, sought=None))
 
-    def take(self, frame: Frame) -> None:
+    def process_frame(self, frame: Frame) -> None:
         """Process an image unless the previous one is still being processed."""
         state, time_s = self._state, frame.host_ts_ns / NANOSECONDS
         if state.sought is None or self._searching.is_running:

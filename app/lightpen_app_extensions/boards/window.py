@@ -182,7 +182,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         if self._capture.state.sought is not None:
             self._live.hurry()
             self._image.set_half(shown.half, shown.size)
-            self._capture.take(shown.seen.frame)
+            self._capture.process_frame(shown.seen.frame)
 
     def _on_folder_clicked(self) -> None:
         if self._named_board() is None:

@@ -168,9 +168,9 @@ class DiscoveryRun(QObject):
         if self._live.operator is not None:
             self._live.operator.swing()
         self._become(is_capturing=True)
-        self._live.set_sink(partial(self._take, recording))
+        self._live.set_sink(partial(self._record_image, recording))
 
-    def _take(self, recording: _Recording, seen: LiveImage) -> None:
+    def _record_image(self, recording: _Recording, seen: LiveImage) -> None:
         """Record an image, on the thread of the images."""
         height, width = seen.frame.image.shape
         if recording.size not in ((0, 0), (width, height)):
@@ -224,9 +224,9 @@ class DiscoveryRun(QObject):
             names = tuple(f"{number:06}.png" for number in range(1, len(spots) + 1))
             return discover(sightings_of_spots(names, spots, size), request, report)
 
-        self._job.start(find, self.take, self._on_failed, progressed=progressed)
+        self._job.start(find, self.adopt, self._on_failed, progressed=progressed)
 
-    def take(self, found: Discovery) -> None:
+    def adopt(self, found: Discovery) -> None:
         """Take over pen, camera and tip as found."""
         guide = guide_of(found)
         mask = self._workbench.selection.preparation.mask

@@ -41,7 +41,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
             self._on_swing_clicked,
             self._on_hold_clicked,
             lambda: self._command(lambda hand: hand.lift()),
-            lambda: self._command(lambda hand: hand.leave()),
+            lambda: self._command(lambda hand: hand.move_away()),
             lambda: self._command(lambda hand: hand.slip(SLIP_MM, SLIP_S)),
             lambda: self._command(lambda hand: hand.cover(COVER_S)),
         )

@@ -382,7 +382,7 @@ def signature_finding(keys: ChainKeys, entry: StoredEntry) -> Message | None:
 # A chain only grows by entries that follow its last one, signed by its keys.
 
 
-SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
+UNUSED = (Kind.REFUSED, Kind.ABANDONED)
 
 
 def own_chain(database: Database) -> str:
@@ -434,8 +434,8 @@ def _require_remembered(connection: Connection, chain: str, database: Database) 
 def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
     if event.result is not None:
         same = ENTRIES.c.result == searchable(event.result.place)
-    elif event.kind in SET_ASIDE:
-        kinds = [kind.value for kind in SET_ASIDE]
+    elif event.kind in UNUSED:
+        kinds = [kind.value for kind in UNUSED]
         same = (ENTRIES.c.swing == searchable(event.swing)) & ENTRIES.c.kind.in_(kinds)
     else:
         return False

@@ -41,7 +41,7 @@ class LazyLogbook:
         logbook = self._open()
         return () if logbook is None else logbook.enter_owed(report)
 
-    def enter_set_aside(
+    def enter_unused(
         self,
         solution: "Solution | None",
         assessment: "SwingAssessment | None",

@@ -219,7 +219,7 @@ class Logbook:
 
     def _abandoned(self) -> Iterator[Path]:
         """Yield the abandoned swings that have no entry."""
-        for folder in _set_aside(self._data / RECORDS):
+        for folder in _abandoned_swings(self._data / RECORDS):
             place = self._results.place_of(folder)
             if not is_swing_entered(self.database, self.chain, place):
                 yield folder
@@ -275,7 +275,7 @@ def _taking_back(event: Event, back: StoredEntry) -> Event:
     )
 
 
-def _set_aside(records: Path) -> Iterator[Path]:
+def _abandoned_swings(records: Path) -> Iterator[Path]:
     """Yield the folders of the swings that were abandoned, the oldest first."""
     try:
         folders = sorted(records.iterdir()) if records.is_dir() else []

@@ -83,7 +83,7 @@ class FramePairs:
         self.note(c, frame)
         self._waiting[c].append(frame)
 
-    def take(self, n_images: int | None = None) -> Frame | None:
+    def next_frame(self, n_images: int | None = None) -> Frame | None:
         """Return the first camera's frame with the other's; None without a pair.
 
         ``n_images`` is the length of two recordings that are repeated.

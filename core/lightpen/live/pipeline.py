@@ -402,10 +402,10 @@ class Live:
             self._refuse_recordings()
             return None
         n_images = counts.pop() if len(counts) == 1 else None
-        moment = self._pairs.take(n_images)
+        moment = self._pairs.next_frame(n_images)
         if moment is None:
             self._add_next()
-            moment = self._pairs.take(n_images)
+            moment = self._pairs.next_frame(n_images)
         moved_ms = self._pairs.moved_ms()
         if moved_ms is not None:
             self._listener.on_camera(FaultRaised(FramesDelayed(held_up(moved_ms))), 1)

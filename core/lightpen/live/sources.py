@@ -31,7 +31,7 @@ class Operator(Protocol):
     def lift(self) -> None:
         """Lift the tip and stay above the cone."""
 
-    def leave(self) -> None:
+    def move_away(self) -> None:
         """Move the pen out of the image."""
 
     def swing(self) -> None:

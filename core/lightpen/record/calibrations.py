@@ -142,22 +142,12 @@ class CalibrationFile(JudgedCalibration):
         return np.array(self.calibration.cone_cam_mm)
 
     @property
-    def is_of_rig(self) -> bool:
-        """Whether several cameras were used; frames then have detections of each."""
-        return self.calibration.rig is not None
-
-    @property
     def camera_hashes(self) -> tuple[str, ...]:
         """SHA-256 of the camera file, or of a rig file with its camera files."""
         inputs = self.calibration.inputs
         if inputs.rig is None:
             return (inputs.camera.sha256,)
         return (inputs.rig.sha256, *(each.sha256 for each in inputs.cameras))
-
-    @property
-    def camera_sha256(self) -> str:
-        """SHA-256 of the camera file, for a rig of the first camera's."""
-        return self.calibration.inputs.camera.sha256
 
     @property
     def pen_sha256(self) -> str:

@@ -355,7 +355,7 @@ class SwingWorkflow:
             self._recorder.discard()
         self.abandon()
         self._faults.trying(
-            lambda: self._logbook.enter_set_aside(
+            lambda: self._logbook.enter_unused(
                 status.solution, status.assessment, self._now()
             )
         )

@@ -30,7 +30,7 @@ class ProbingOperator:
             return
         if task is None:
             self._wanted = wanted
-            operator.leave()
+            operator.move_away()
             return
         if is_at_rest(state) and not is_lifted:
             operator.lift()

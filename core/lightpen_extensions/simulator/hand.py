@@ -249,7 +249,7 @@ class SimulatedOperator:
         """Lift the tip and stay above the cone."""
         self._wish(partial(self._go, HOVER))
 
-    def leave(self) -> None:
+    def move_away(self) -> None:
         """Move the pen out of the image."""
         self._wish(partial(self._go, AWAY))
         self._wish(partial(self._aim, UPRIGHT, GUIDED))

@@ -51,7 +51,7 @@ def paired(
     came = [(frame, 0) for frame in first] + [(frame, 1) for frame in second]
     for frame, c in sorted(came, key=lambda each: each[0].host_ts_ns):
         pairs.add(c, frame)
-        while (moment := pairs.take(n_images)) is not None:
+        while (moment := pairs.next_frame(n_images)) is not None:
             found.append((moment.seq, moment.others[0].seq))
     return pairs, found
 
@@ -128,7 +128,7 @@ def test_clocks_that_drift_apart_are_not_reported_as_held_up() -> None:
             pairs.add(
                 c, Frame(IMAGE, seq, there_ns, round(clock * taken_ns + 1e12 * c))
             )
-        while (moment := pairs.take()) is not None:
+        while (moment := pairs.next_frame()) is not None:
             assert moment.seq == moment.others[0].seq
         assert pairs.moved_ms() is None
 
@@ -157,15 +157,15 @@ def test_frames_wait_for_a_camera_that_is_gone_but_not_without_end() -> None:
     pairs = FramePairs()
     for frame in frames():
         pairs.add(0, frame)
-        assert pairs.take() is None
+        assert pairs.next_frame() is None
     assert pairs.wanted == 1
     assert pairs.n_unpaired == N_FRAMES - LONGEST_WAITING
     for frame in list(frames())[: N_FRAMES // 2]:
         pairs.add(1, frame)  # whose clock is known by then
-        pairs.take()
+        pairs.next_frame()
     for frame in frames(late_ms=PERIOD_MS * N_FRAMES):
         pairs.add(0, frame)
-        assert pairs.take() is None
+        assert pairs.next_frame() is None
     n_unpaired = pairs.n_unpaired
     assert n_unpaired == 2.5 * N_FRAMES - WAITING
     pairs.forget()

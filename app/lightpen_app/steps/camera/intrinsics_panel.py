@@ -112,7 +112,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         # Connections
         self._path.path_chosen.connect(self._read)
         selection.station_changed.connect(self._forget_file)
-        FileDrops(self).dropped.connect(self._path.take)
+        FileDrops(self).dropped.connect(self._path.accept)
 
         self._refresh()
 

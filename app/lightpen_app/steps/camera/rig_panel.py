@@ -66,7 +66,7 @@ class RigPanel(Translated, QGroupBox):
         # Connections
         self._second.clicked.connect(self._on_second_clicked)
         self._path.path_chosen.connect(self._on_path_chosen)
-        FileDrops(self).dropped.connect(self._path.take)
+        FileDrops(self).dropped.connect(self._path.accept)
         source.value_changed.connect(self._choose)
         source.retry_requested.connect(camera.open)
         selection.changed.connect(self._on_selected)

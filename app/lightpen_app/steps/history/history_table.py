@@ -35,7 +35,22 @@ from lightpen_app.steps.history.entry_panel import (
 from lightpen_app.widgets.fields import ChoiceField, DateField, Translated
 from lightpen_app.widgets.tables import RIGHT, ROW_HEIGHT, Index, RowTable, TitledModel
 
-WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
+# The keys of the columns, as the settings name them.
+COLUMNS = [
+    "when",
+    "station",
+    "pen",
+    "tip",
+    "type",
+    "verdict",
+    "x",
+    "y",
+    "z",
+    "u",
+    "operator",
+    "notes",
+]
+WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(len(COLUMNS))
 NUMBERS = (X, Y, Z, U)
 NAMES = (STATION, PEN, TIP, BY)
 LONGEST_NAME = 16  # letters of a name that are shown
@@ -210,14 +225,15 @@ class HistoryTable(Translated, RowTable):
         self._is_of_one_station = len(stations) <= 1
         self._show_columns()
 
-    def hidden_columns(self) -> tuple[int, ...]:
-        """Return the columns that the user does not want to see."""
-        return tuple(i for i, each in enumerate(self._shown) if not each.isChecked())
+    def hidden_columns(self) -> tuple[str, ...]:
+        """Return the keys of the columns that the user does not want to see."""
+        shown = zip(COLUMNS, self._shown, strict=False)
+        return tuple(key for key, action in shown if not action.isChecked())
 
-    def set_hidden_columns(self, hidden: Sequence[int]) -> None:
-        """Hide columns; all others are shown."""
-        for i, action in enumerate(self._shown):
-            action.setChecked(i not in hidden)
+    def set_hidden_columns(self, hidden: Sequence[str]) -> None:
+        """Hide columns by their keys; all others are shown."""
+        for key, action in zip(COLUMNS, self._shown, strict=False):
+            action.setChecked(key not in hidden)
 
     def current(self) -> Line | None:
         """Return the current line."""

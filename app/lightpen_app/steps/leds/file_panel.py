@@ -86,7 +86,7 @@ class LedFilePanel(Translated, QWidget):
 
         # Connections
         self._path.path_chosen.connect(lambda path: self._open(Path(path)))
-        FileDrops(self).dropped.connect(self._path.take)
+        FileDrops(self).dropped.connect(self._path.accept)
         self._units.textActivated.connect(self._on_units_chosen)
         self.question.declined.connect(self._on_declined)
         self._selection.changed.connect(self._on_selection_changed)

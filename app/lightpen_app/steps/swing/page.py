@@ -191,7 +191,7 @@ class SwingPage(Page):
             self._view.plots().show_next(state, setup.limits.max_uncertainty)
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:
-        self._presenter.sight.take(shown)
+        self._presenter.sight.add_image(shown)
         if self.isVisible():
             self._view.set_image(shown)
         self._show_soon()

@@ -155,7 +155,7 @@ class LiveDetectionView(QObject):
         self._rate = FrameRate()
         self._unfit: deque[bool] = deque(maxlen=N_LAST)
 
-    def take(self, shown: DisplayedImage) -> None:
+    def add_image(self, shown: DisplayedImage) -> None:
         """Process one more image."""
         self._seen = shown.seen
         self._unfit.append(self._is_unfit(shown.seen))

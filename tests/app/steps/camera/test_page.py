@@ -205,7 +205,7 @@ def test_a_rig_file_that_cannot_be_read_is_reported_where_it_was_chosen(
     live.wait("Baseline")
     (tmp_path / "rig.json").write_text("{}")
     panel = live.child(RigPanel)
-    panel._path.take(str(tmp_path / "rig.json"))
+    panel._path.accept(str(tmp_path / "rig.json"))
 
     live.until(lambda: "cameras" in panel._problem.value().text)
     assert panel._problem.value().tone is Tone.BAD
@@ -735,7 +735,7 @@ def test_a_mask_adds_to_the_one_before(
     workbench.selection.set_preparation(
         replace(workbench.selection.preparation, mask=first)
     )
-    plugged(workbench, small_scene, *LAMPS).operator.leave()
+    plugged(workbench, small_scene, *LAMPS).operator.move_away()
     seen.page.entered()
     seen.wait("Live")
     operator_of(workbench).cover()

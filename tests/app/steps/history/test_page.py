@@ -254,11 +254,11 @@ def test_a_column_that_is_not_wanted_stays_hidden(desk: Desk) -> None:
     tip.trigger()
 
     assert desk.table.isColumnHidden(TIP)
-    assert desk.workbench.settings.last().hidden_columns == (TIP,)
+    assert desk.workbench.settings.last().hidden_columns == ("tip",)
     again = HistoryPage(desk.workbench)
     again.entered()
     (table,) = again.findChildren(HistoryTable)
-    assert table.hidden_columns() == (TIP,)
+    assert table.hidden_columns() == ("tip",)
     again.shut_down()
     QThreadPool.globalInstance().waitForDone()
 

@@ -576,7 +576,7 @@ def test_a_pen_that_is_away_is_not_found(
     workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")  # the simulated pen is shown by itself
-    camera.operator.leave()
+    camera.operator.move_away()
 
     seen.wait("Pen not found")
     assert "No LED seen" in seen.words

@@ -131,7 +131,7 @@ def test_an_operator_who_was_asked_for_something_is_free_no_more() -> None:
     scene.watch(8)
     assert not scene.operator.is_free
 
-    scene.operator.leave()
+    scene.operator.move_away()
     scene.watch(8)
     assert scene.operator.is_free
 
@@ -142,7 +142,7 @@ def test_a_pen_that_is_away_shows_no_led_in_the_image() -> None:
         MAX_TILT, np.pi, 0
     )  # to the side from which it is in longest
     scene.watch(2)
-    scene.operator.leave()
+    scene.operator.move_away()
     held = scene.watch(6)[-1]
     rotation = held.postures.rotations[0]
     translation = PAPER_CONE + held.offsets[0] - rotation @ PAPER_TIP

@@ -626,7 +626,7 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -
         operator.lift,
         operator.seat,
         operator.seat,
-        operator.leave,
+        operator.move_away,
         lambda: operator.cover(rng.uniform(0.1, 2.0)),
         lambda: operator.cover(rng.uniform(0.1, 2.0), [1, 2, 3, 7]),
         lambda: station.clock.wait(rng.uniform(0.1, 4.0)),
