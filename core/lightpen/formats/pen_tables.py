@@ -295,6 +295,7 @@ LISTS = (
     ("TrackedObject/ModelPoints", "m"),  # Rift
     ("lighthouse_config/modelPoints", "m"),  # Vive
     ("ModelPoints", "m"),
+    ("fiducials", ""),  # Atracsys, saw
     *((name, "") for name in ("markers", "MarkerPositions", "points", "leds")),
     *(
         (f"{body}/markers", "")

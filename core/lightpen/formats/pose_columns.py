@@ -34,7 +34,7 @@ _UNIT = (
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
-_ROTATING |= {"四元数", "旋转", "姿态"}
+_ROTATING |= {"四元数", "旋转", "姿态", "o"}  # ox to ow of ZED
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
 _MOVING |= {"平移", "位置", "坐标"}
 _SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}

@@ -225,8 +225,9 @@ def motive_table(text: str, name: str) -> str:
     start = next((i for i, each in enumerate(lines) if each.startswith("Frame,")), 0)
     above = [row for row in csv.reader(lines[1:start]) if any(row)]
     axes = next(csv.reader(lines[start : start + 1]))
-    if not above:
-        raise FileError("poses.unknown-columns", name=name, header=", ".join(axes))
+    if not above or "Rigid Body" not in text:
+        program = message("poses.markers-of-motive")
+        raise FileError("poses.foreign", name=name, program=program)
     width = len(axes)
     rows = [row + [""] * (width - len(row)) for row in above]
     # Before version 2 of Motive the rows have no titles; the names are in the second.

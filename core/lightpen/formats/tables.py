@@ -38,10 +38,11 @@ _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
 _COMMENT = r"\s*(?:[#%]|//)"  # of MATLAB and C++, too
-# Full-width characters, and minus signs that are not of ASCII.
-_PLAIN = {0xFF01 + i: 0x21 + i for i in range(94)} | {0x2212: "-", 0x2013: "-"}
+# Full-width characters, minus signs that are not of ASCII, blanks within numbers.
+_PLAIN: dict[int, str] = {0xFF01 + i: chr(0x21 + i) for i in range(94)}
+_PLAIN |= {0x2212: "-", 0x2013: "-", 0x2009: "", 0x202F: ""}
 _FORTRAN = r"(?a)(?<=\d)[dD](?=[+-]\d)"  # the E of a number
-FEWEST_EQUAL = 0.5  # of the lines of a table, as long as the first
+_BLANKS = r" *\S+( +[+-]?\d+,\d+){2,} *"  # between numbers with decimal commas
 _CELL = r"[^\s;,|=+:-]"  # lines of a spreadsheet and rules have none
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
@@ -378,6 +379,8 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
 
 def _separator(lines: list[str]) -> str | None:
     """Return the column separator of most lines; None for blanks."""
+    if 2 * sum(bool(re.fullmatch(_BLANKS, line)) for line in lines) > len(lines):
+        return None
     for candidate in (";", "\t", "|", ","):
         if 2 * sum(candidate in line for line in lines) > len(lines):
             return candidate
@@ -429,7 +432,7 @@ def _check_lengths(
         if len(row) != expected:
             if separator == "," and len(row) > expected:
                 hint = message("table.decimal-commas")
-            elif n_equal < FEWEST_EQUAL * len(rows):
+            elif 2 * n_equal < len(rows):
                 hint = message("table.none")
             else:
                 hint = message("table.short-line")

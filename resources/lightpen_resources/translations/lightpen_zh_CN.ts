@@ -5176,6 +5176,10 @@
         <translation>多数中心在图像之外：最远到 ({x:.0f}, {y:.0f}) px；图像为 {width} x {height} px。请检查图像尺寸。</translation>
     </message>
     <message>
+        <source>Motive without rigid bodies</source>
+        <translation>没有刚体的 Motive 文件</translation>
+    </message>
+    <message>
         <source>Moves of the drift reference / mm</source>
         <translation>漂移参考点的移动 / mm</translation>
     </message>
@@ -5952,6 +5956,10 @@
         <translation>{cell} 不是数字。请改正，未知的值请留空。</translation>
     </message>
     <message>
+        <source>{cell} is not a whole number. Put the names of the columns on top, or correct it.</source>
+        <translation>{cell} 不是整数。请在首行写明各列名称，或更正该值。</translation>
+    </message>
+    <message>
         <source>{cell} is the name of no LED, which ends in its number here. Remove the line, or number the LED.</source>
         <translation>{cell} 不是 LED 的名称：此处的名称以编号结尾。请删除该行，或给 LED 编号。</translation>
     </message>
@@ -6534,10 +6542,6 @@
     <message>
         <source>{cell} is not a finite number.</source>
         <translation>{cell} 不是有限数。</translation>
-    </message>
-    <message>
-        <source>{cell} is not a whole number.</source>
-        <translation>{cell} 不是整数。</translation>
     </message>
     <message>
         <source>{count} columns</source>

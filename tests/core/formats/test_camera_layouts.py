@@ -539,6 +539,8 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ("# {05D8C294-F295-4DFB-9D01-096BD04049F4}\nWidth\t9\n", "GenICam"),
         ("1 4638.2 2448 2048 1219.6 1031.3 1 -0.08 0.1 0 0 0\n", "Argus"),
         (11 * "3.4e-01,8.2e-01\n", "DLT"),
+        ("% Focal Length:   fc = [ 2603.9 2603.6 ] +/- [ 17 16 ]\n", "Bouguet"),
+        ({"aux-param-autoexposure-setpoint": "1536"}, "It holds no intrinsics"),
         ("Project: a\nFocal length: [ 4640.0 4635.5 ] +/- [ 1 1 ]\n", "GML"),
         ({"cameraMatrix": MATRIX, "D": BROWN, "projection": FLAT}, "image size"),
         ("<PlusConfiguration><Data>1</Data></PlusConfiguration>", "the entries Data"),

@@ -240,6 +240,7 @@ MAPPINGS = [dict(zip("xyz", point, strict=True)) for point in POINTS]
             },
         },
         {"units": "mm", "points": [{"position": point} for point in POINTS]},
+        {"units": "mm", "count": 10, "fiducials": [{"position": p} for p in POINTS]},
         {
             "units": "mm",
             "points": [

@@ -47,6 +47,11 @@ def scalar_last() -> list[str]:
     return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
 
 
+def of_zed() -> list[str]:
+    header = "timestamp\ttx\tty\ttz\tox\toy\toz\tow"
+    return [header, *rows(np.arange(N_POSES), MOVED, QUATERNIONS)]
+
+
 def in_chinese() -> list[str]:
     header = "帧\t四元数x\t四元数y\t四元数z\t四元数w\t平移x(mm)\t平移y(mm)\t平移z(mm)"
     return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
@@ -90,6 +95,7 @@ def named_by_tool() -> list[str]:
     "lines",
     [
         *(
+            of_zed,
             in_german,
             in_chinese,
             scalar_last,
@@ -207,6 +213,9 @@ def test_a_pose_that_a_flag_calls_invalid_is_left_out(
         (b"01 01+08499+00123-00044+00022+012345-004567-140000+00012\n", "NDI"),
         (b"poses:\n  - x: 1\n    y: 2\n", "YAML"),
         (b"Pose 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "matrices"),
+        (b"1716304712,0,map,0.1,0.2,0.3,0,0,0,1\n", "ROS 2"),
+        (b"6, 12, empivot.txt\n  1.0,  2.0,  3.0\n", "CIS"),
+        (b"Format Version,1.23\n\n,Type,Marker\nFrame,Time,X\n", "Motive"),
         (b"HIERARCHY\nROOT pen\n", "BVH"),
         (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
     ],

@@ -124,6 +124,7 @@ def test_what_is_not_a_number_is_named(cell: str, flaw: str) -> None:
         ("\N{MINUS SIGN}3", -3.0),
         ("\N{EN DASH}0,5", -0.5),
         ("\uff11\uff0e\uff15", 1.5),
+        ("1\N{NARROW NO-BREAK SPACE}248,5", 1248.5),
         ("-2.5D-01", -0.25),
         ("1.25d+2", 125.0),
     ],
@@ -138,6 +139,12 @@ def test_lines_of_a_report_are_no_table() -> None:
     text = refusal("led,x,y\n1\n2,3\nDIM 3\n1,2,3\n")
     assert text.startswith("Line 2 of lp04_leds.csv has 1 cells where line 1 has 3.")
     assert "no table" in text
+
+
+def test_blanks_separate_decimal_commas() -> None:
+    table = parse_table("led  x  y\n1  2,5  -3,0\n2  4,5  5,0\n", "t.txt")
+
+    assert table.numbers([1, 2]).tolist() == [[2.5, -3.0], [4.5, 5.0]]
 
 
 @pytest.mark.parametrize(
