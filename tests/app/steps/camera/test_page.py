@@ -207,13 +207,13 @@ def test_a_rig_file_that_cannot_be_read_is_reported_where_it_was_chosen(
     panel = live.child(RigPanel)
     panel._path.accept(str(tmp_path / "rig.json"))
 
-    live.until(lambda: "cameras" in panel._problem.value().text)
+    live.until(lambda: "no rig file" in panel._problem.value().text)
     assert panel._problem.value().tone is Tone.BAD
     assert workbench.selection.preparation.rig_file is not None
     assert "remains in use: Baseline" in live.words
 
     workbench.selection.changed.emit(workbench.selection.preparation)
-    assert "cameras" in panel._problem.value().text
+    assert "no rig file" in panel._problem.value().text
 
     ask_for_second(live)
     assert not panel._problem.value().text
