@@ -169,7 +169,10 @@ def _read(stream: BinaryIO, name: str, place: PagePlace | None) -> Image:
     size = stream.seek(0, os.SEEK_END)
     with _MEMORY.given(_needed(header, size, name)):
         stream.seek(0)
-        return grey_image(_decoded(stream.read(size), name), name)
+        image = grey_image(_decoded(stream.read(size), name), name)
+    if header.full_scale and 255 < header.full_scale < image.max(initial=0):
+        raise FileError("image.above-scale", name=name, most=header.full_scale)
+    return image
 
 
 def _page(stream: BinaryIO, page: TiffPage, name: str) -> Image:

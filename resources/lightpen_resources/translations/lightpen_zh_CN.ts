@@ -6012,6 +6012,10 @@
         <translation>{n_views} 幅图像显示标定板；至少需要 {least} 幅，{enough} 幅更好。请增加标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
     </message>
     <message>
+        <source>{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, turn images back that another program turned by 90 degrees, or switch off binning and cropping.</source>
+        <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，把被其他程序旋转了 90 度的图像转回，或关闭像素合并和裁剪。</translation>
+    </message>
+    <message>
         <source>{n_wrong} of {n_readable} images are {size}. The intrinsics file is for {width} x {height} px: it states binning or a region (binning_x, binning_y, roi) of {of_width} x {of_height} px. Correct these entries, or choose the file for this camera.</source>
         <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}。内参文件适用于 {width} × {height} px：该文件声明了 {of_width} × {of_height} px 图像的像素合并或区域（binning_x、binning_y、roi）。请更正这些条目，或选择这台相机的文件。</translation>
     </message>
@@ -6058,6 +6062,10 @@
     <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
+    </message>
+    <message>
+        <source>{name} has levels above {most}, the highest that it states: the two bytes of each value are probably exchanged. Save the images with the high byte first, or as PNG.</source>
+        <translation>{name} 中有高于 {most}（文件声明的最高值）的灰度值：每个值的两个字节可能颠倒了。请以高字节在前保存图像，或保存为 PNG。</translation>
     </message>
     <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
@@ -6614,10 +6622,6 @@
     <message>
         <source>{n_usable} of {n_images} images are usable</source>
         <translation>{n_images} 幅图像中有 {n_usable} 幅可用</translation>
-    </message>
-    <message>
-        <source>{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.</source>
-        <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，或关闭像素合并和裁剪。</translation>
     </message>
     <message>
         <source>{name} cannot be decoded.</source>

@@ -364,6 +364,16 @@ def test_a_pgm_states_the_full_scale_of_its_images(
     assert source.of_bits(12).full_scale == 4095
 
 
+def test_a_pgm_with_exchanged_bytes_is_named(tmp_path: Path) -> None:
+    levels = np.full(GREY.shape, 1000, "<u2")
+    head = f"P5\n{GREY.shape[1]} {GREY.shape[0]}\n4095\n".encode()
+    (tmp_path / "a.pgm").write_bytes(head + levels.tobytes())
+    (load,) = find_images(str(tmp_path / "a.pgm")).open()
+
+    with pytest.raises(FileError, match=r"above 4095.*bytes of each value"):
+        load()
+
+
 @pytest.mark.parametrize("kind", [2, 3])
 @pytest.mark.parametrize("end", ["", "\n"])
 def test_numbers_of_an_image_in_text_may_end_the_file(
