@@ -47,6 +47,7 @@ OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
 FEWEST_COLUMNS = 2  # x and y of LEDs, in a table with a line for each frame
+NOWHERE = (9999, 32767, 65535, 99999)  # both coordinates of an LED that is not seen
 MANY_CENTERS = 20  # as no program lists only in the corner of an image
 LARGEST_TRANSLATION = 1e6  # mm
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
@@ -158,7 +159,7 @@ def _long(table: Table) -> Table:
         if (named := re.fullmatch(_WIDE, column))
     }
     leds = [led for axis, led in places if axis == "x" and ("y", led) in places]
-    if len(leds) < FEWEST_COLUMNS:
+    if len(leds) < FEWEST_COLUMNS or set(_LED) & set(table.header):
         return table
     (frame,) = table.columns([_FRAME], message("table.of-centers"))
     rows = [
@@ -216,7 +217,8 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     pixels = table.numbers_or_none(columns)
     # Programs write (0, 0), (-1, -1), (-9999, -9999) for centres that they lack.
     x, y = pixels.T
-    nothing = (x == y) & (x <= 0) & (x == np.round(x)) | (x == -1) | (y == -1)
+    is_mark = (x == np.round(x)) & ((x <= 0) | np.isin(x, NOWHERE))
+    nothing = (x == y) & is_mark | (x == -1) | (y == -1)
     seen = np.where((nothing | np.isnan(x + y))[:, None], np.nan, pixels)
     is_share = np.nanmax(seen, initial=0) <= 1 and np.nanmin(seen, initial=1) >= 0
     if is_share and len(seen) > MANY_CENTERS:

@@ -69,6 +69,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         (HEADER, "a_07.png,LED1,1.5,2.5", "a_02.png,LED1,3,4", "a_07.png,LED3,5,6"),
         (HEADER, "/a/07.png,#1,1.5,2.5", "/a/02.png,#1,3,4", "/a/07.png,#3,5,6"),
         (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
+        (HEADER + ",x1,y1,x2,y2", "7,1,1.5,2.5,0,0,0,0", "2,1,3,4,,,,", "7,3,5,6,,,,"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
         ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
         ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
@@ -78,7 +79,14 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
     ids=[
         *("header", "no header", "other order", "more columns"),
         *("of a spreadsheet", "of MATLAB", "names", "paths", "a frame without LEDs"),
-        *("a line for a frame", "names in front", "with units", "of trackpy", "units"),
+        *(
+            "of each LED, too",
+            "a line for a frame",
+            "names in front",
+            "with units",
+            "of trackpy",
+            "units",
+        ),
     ],
 )
 def test_centres_are_sorted_by_frame_and_led(
@@ -99,7 +107,7 @@ def test_centres_are_sorted_by_frame_and_led(
     [
         *("-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999"),
         *("inf,inf", "-nan(ind),-nan(ind)", "-nan,-nan", "1.#QNAN,1.#QNAN"),
-        "-1,200",
+        *("-1,200", "9999,9999", "65535,65535"),
     ],
 )
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
