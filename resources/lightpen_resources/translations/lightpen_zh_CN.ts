@@ -5952,8 +5952,8 @@
         <translation>{cell} 不是帧的编号或时间：最多 19 位数字，其中小数点后 9 位。</translation>
     </message>
     <message>
-        <source>{cell} is not a number. Correct it, or leave out what is not known.</source>
-        <translation>{cell} 不是数字。请改正，未知的值请留空。</translation>
+        <source>{cell} is not a number; leave out what is not known or does not belong here.</source>
+        <translation>{cell} 不是数字；未知或不属于此处的内容请删去。</translation>
     </message>
     <message>
         <source>{cell} is not a whole number. Put the names of the columns on top, or correct it.</source>

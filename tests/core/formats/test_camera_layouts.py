@@ -541,6 +541,8 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         (11 * "3.4e-01,8.2e-01\n", "DLT"),
         ("% Focal Length:   fc = [ 2603.9 2603.6 ] +/- [ 17 16 ]\n", "Bouguet"),
         ({"aux-param-autoexposure-setpoint": "1536"}, "It holds no intrinsics"),
+        ("<c><image width='9'/><intrinsics fx='9' fy='9'/></c>", "XML with attributes"),
+        ('// mine\n{"image_width": 9}\n', "JSON with comments"),
         ("Project: a\nFocal length: [ 4640.0 4635.5 ] +/- [ 1 1 ]\n", "GML"),
         ({"cameraMatrix": MATRIX, "D": BROWN, "projection": FLAT}, "image size"),
         ("<PlusConfiguration><Data>1</Data></PlusConfiguration>", "the entries Data"),

@@ -89,8 +89,8 @@ def test_rows_know_their_lines() -> None:
 def test_a_letter_in_a_number_is_named_with_its_line() -> None:
     lines = ["led;x_mm;y_mm", *(f"{n};{n},5;0,0" for n in range(1, 13)), "13;12,4O;0,0"]
     assert refusal("\n".join(lines)) == (
-        'Line 14 of lp04_leds.csv: "12,4O" is not a number. '
-        "Correct it, or leave out what is not known."
+        'Line 14 of lp04_leds.csv: "12,4O" is not a number; leave out what '
+        "is not known or does not belong here."
     )
 
 
