@@ -143,14 +143,14 @@ def test_the_fit_is_the_average_over_all_sizes(name: FieldName, times: float) ->
     noise = 0.01 * LARGEST[name]
     found = size_of(field, np.eye(1) / noise**2, np.array([times / noise]))
 
-    sizes = np.append(0.0, LARGEST[name] * 1000.0 ** (np.arange(60) / 59 - 1))
+    sizes = np.append(0.0, LARGEST[name] * 100.0 ** (np.arange(40) / 39 - 1))
     both = noise**2 + 4 * sizes**2
     seen = times * noise
     costs = np.log(both / noise**2) + seen**2 / both - seen**2 / noise**2
     best = int(np.argmin(costs))
     assert found.sigma == pytest.approx(sizes[best])
     assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
-    likely = np.exp(-0.5 * (costs - costs.min())) * np.append(0.4, np.full(60, 0.01))
+    likely = np.exp(-0.5 * (costs - costs.min())) * np.append(0.4, np.full(40, 0.015))
     likely /= likely.sum()
     estimates = 4 * sizes**2 / both * seen
     mean = likely @ estimates
@@ -168,8 +168,8 @@ def test_averages_over_shapes_and_directions_are_those_of_all_models() -> None:
     S, right = B @ B.T, 30 * rng.standard_normal(3)
     found = size_of(field, S, right)
 
-    sizes = LARGEST[FieldName.LENS] * 1000.0 ** (np.arange(60) / 59 - 1)
-    # None with either shape, or one of 60 sizes.
+    sizes = LARGEST[FieldName.LENS] * 100.0 ** (np.arange(40) / 39 - 1)
+    # None with either shape, or one of 40 sizes.
     estimates: list[FloatArray] = [np.zeros(3)]
     weights = [2 * 0.4]
     for shape in shapes:
@@ -178,7 +178,7 @@ def test_averages_over_shapes_and_directions_are_those_of_all_models() -> None:
             estimates.append(np.asarray(np.linalg.solve(S + known, right), dtype=float))
             volume = np.linalg.slogdet(np.eye(3) + size**2 * shape @ S)[1]
             likely = right @ estimates[-1] - volume
-            weights.append(0.01 * np.exp(0.5 * likely))
+            weights.append(0.015 * np.exp(0.5 * likely))
     share = np.array(weights) / sum(weights)
     mean = share @ np.array(estimates)
     spread = np.cov(np.array(estimates).T, aweights=share, ddof=0)
