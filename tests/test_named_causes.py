@@ -91,7 +91,7 @@ def moved(led: int, by: float) -> Pen:
     ("pen", "named"),
     [
         (exchanged(2, 3), "LEDs 2 and 3 are exchanged"),
-        (with_leds(PEN.leds * [-1, 1, 1]), "mirror image of the pen (sign of x"),
+        (with_leds(PEN.leds * [-1, 1, 1]), "or the images are mirrored"),
         (with_leds(PEN.leds * [1, -1, 1]), "mirror image of the pen (sign of x"),
         (with_leds(PEN.leds * [1, 1, -1]), "mirror image of the pen (sign of z)"),
         (with_leds(PEN.leds[:, [1, 0, 2]]), "mirror image of the pen (sign of x"),

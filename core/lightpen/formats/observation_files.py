@@ -3,10 +3,11 @@
 LED centres have the columns ``frame,led,x_px,y_px``; those of unknown LEDs have
 ``frame,x_px,y_px``. A frame has a number, or a time of up to 9 decimals. A table may
 also have a line for each frame with columns such as ``x1,y1,x2,y2`` or
-``led1_x,led1_y``. LEDs that were not seen may be left out, or have empty cells, NaN,
-(0, 0) or (-1, -1). Poses have the row-major rotation ``r11,r12,r13,r21,...,r33`` and
-the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen. A column ``pose`` with the number
-of each is optional; further columns are not read.
+``led1_x,led1_y``. LEDs that were not seen may be left out, have empty cells, NaN,
+(0, 0) or (-1, -1), or a column such as ``visible`` that says so. Poses have the
+row-major rotation ``r11,r12,r13,r21,...,r33`` and the translation
+``tx_mm,ty_mm,tz_mm`` of cam_from_pen. A column ``pose`` with the number of each is
+optional; further columns are not read.
 Without a header the columns stand in this order, with the number first if there is one.
 """
 
@@ -22,6 +23,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import HEAD, MEGABYTE, foreign_program, quoted, read_bytes
 from lightpen.formats.images import natural_order
+from lightpen.formats.pose_columns import STATE, is_lost
 from lightpen.formats.pose_files import (
     SEQUENCE_SUFFIXES,
     GivenPoses,
@@ -48,6 +50,7 @@ MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
 FEWEST_COLUMNS = 2  # x and y of LEDs, in a table with a line for each frame
 NOWHERE = (9999, 32767, 65535, 99999)  # both coordinates of an LED that is not seen
+LARGEST_SENSOR = 30  # mm from its middle, of medium format
 MANY_CENTERS = 20  # as no program lists only in the corner of an image
 LARGEST_TRANSLATION = 1e6  # mm
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
@@ -219,10 +222,13 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     x, y = pixels.T
     is_mark = (x == np.round(x)) & ((x <= 0) | np.isin(x, NOWHERE))
     nothing = (x == y) & is_mark | (x == -1) | (y == -1)
+    for column, name in enumerate(table.header):
+        if re.fullmatch(STATE, name):
+            nothing |= np.array([is_lost(row[column], name) for row in table.rows])
     seen = np.where((nothing | np.isnan(x + y))[:, None], np.nan, pixels)
-    is_share = np.nanmax(seen, initial=0) <= 1 and np.nanmin(seen, initial=1) >= 0
-    if is_share and len(seen) > MANY_CENTERS:
-        raise FileError("centers.normalised", name=table.name)
+    size = np.nanmax(np.abs(seen), initial=0)
+    if size <= LARGEST_SENSOR and len(seen) > MANY_CENTERS:
+        raise FileError("centers.normalised", name=table.name, size=size)
     return seen
 
 

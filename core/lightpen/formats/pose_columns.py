@@ -44,8 +44,9 @@ _ANGLE = (
     r"|alpha|beta|gamma|eta|theta|psi|azimuth|elevation))([\W_]+(deg|rad)\w*\W?)?"
 )
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
-STATE = r".*(state|status|valid|visible|visibility|tracked|tracking|\bok|_ok\b).*"
-_FLAG = r"valid|visib|track|ok\b"  # 0 says no; as a state, it may say that all is well
+_WORDS = r"(?<!in)visib|(?<!in)valid|tracked|tracking|detected"
+STATE = rf".*(state|status|{_WORDS}|\bok|_ok\b).*"
+_FLAG = rf"{_WORDS}|ok\b"  # 0 says no; as a state, it may say that all is well
 _LOST = (
     r"(?i)(missing|invalid|lost|disabled|occluded|false|not|no\b|bad|fail|error|out"
     r"|untracked|unknown|nan).*"
@@ -83,7 +84,7 @@ def tools_of(table: Table) -> list[ToolColumns]:
         if role is not None and role.kind == "t" and stated and stated[2]:
             unit = printable(stated[2])
             raise FileError("poses.unit", name=table.name, unit=unit)
-    matrix = _matrix(table.header)
+    matrix = _matrix(table)
     if matrix is not None:
         return [matrix]
     known = [i for i, role in enumerate(roles) if role is not None]
@@ -193,10 +194,10 @@ def _name(table: Table, before: range, prefix: str) -> str:
     return cell if ":" not in header and not cell.isdecimal() else header
 
 
-def _matrix(header: Sequence[str]) -> ToolColumns | None:
+def _matrix(table: Table) -> ToolColumns | None:
     """Return the columns of a matrix by names such as ``r11`` and ``m03``."""
     found: dict[tuple[int, int], int] = {}
-    for i, name in enumerate(header):
+    for i, name in enumerate(table.header):
         element = re.fullmatch(_ELEMENT, name)
         if element:
             found.setdefault((int(element[1]), int(element[2])), i)
@@ -205,18 +206,23 @@ def _matrix(header: Sequence[str]) -> ToolColumns | None:
     least = min(min(found))
     rows = range(least, least + 3)
     last = least + 3
+    fourth = [found[i, last] for i in rows if (i, last) in found]
+    cells = "".join(row[i] for row in table.rows for i in fourth)
+    if (last, least) in found and not re.search("[1-9]", cells):
+        # OpenGL and Unity write matrices column by column.
+        found = {(j, i): place for (i, j), place in found.items()}
     matrix = [found.get((i, j)) for i in rows for j in rows]
     moved = [found.get((i, last)) for i in rows]
     unit = None
     if None in moved:
-        roles = _roles(header)
+        roles = _roles(table.header)
         places = {r.axis: i for i, r in enumerate(roles) if r and r.kind == "t"}
         moved = [places.get(axis) for axis in "xyz"]
         units = [r.unit for r in roles if r and r.kind == "t"]
         unit = units[0] if units else None
     if None in matrix or None in moved:
         return None
-    state = [i for i, name in enumerate(header) if re.fullmatch(STATE, name)]
+    state = [i for i, name in enumerate(table.header) if re.fullmatch(STATE, name)]
     return ToolColumns(
         name="",
         translation=tuple(i for i in moved if i is not None),

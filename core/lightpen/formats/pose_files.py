@@ -39,7 +39,10 @@ NOTHING_BELOW = -1e20  # NDI writes -3.7e28 for what it does not see
 MAX_TOOLS = 20
 
 _TRANSFORM = r"(?m)^Seq_Frame(\d+)_(\w+?)Transform(Status)?\s*:?=\s*(.+?)\s*$"
-_TOOL_COLUMN = r"(?:tool|handle|rigid|object|sensor|target|body|device|port).*"
+_TOOL_COLUMN = (
+    r"(?:tool|handle|rigid|object|sensor|target|body|device|port|tag|child).*"
+    r"|(?:(?:aruco|marker)[\W_]?)?id"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +157,7 @@ def _rows_by_tool(table: Table, tools: Sequence[ToolColumns]) -> dict[str, list[
         rows: dict[str, list[int]] = {}
         for i, row in enumerate(table.rows):
             rows.setdefault(row[column], []).append(i)
-        if 1 < len(rows) <= MAX_TOOLS:
+        if 1 < len(rows) <= min(MAX_TOOLS, len(table.rows) / 2):
             return rows
     return {}
 

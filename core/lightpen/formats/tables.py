@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from itertools import compress
 from pathlib import Path
 from typing import NoReturn
 
@@ -280,6 +281,9 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         number = numbers.pop(0)
         if not is_foreign:
             _check_header(header, number, name)
+        # Of recordings that were joined, each has the header.
+        kept = [tuple(map(str.casefold, row)) != header for row in rows]
+        rows, numbers = list(compress(rows, kept)), list(compress(numbers, kept))
     else:
         header = _header_in_comment(text, separator, len(rows[0]))
         if (

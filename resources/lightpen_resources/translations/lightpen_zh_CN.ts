@@ -5864,8 +5864,8 @@
         <translation>直线度</translation>
     </message>
     <message>
-        <source>the LED file is a mirror image of the pen (sign of x or of y, or x and y exchanged)</source>
-        <translation>LED 文件为光笔的镜像（x 或 y 的符号，或 x 与 y 互换）</translation>
+        <source>the LED file is a mirror image of the pen (sign of x or of y, or x and y exchanged), or the images are mirrored (ReverseX, ReverseY)</source>
+        <translation>LED 文件为光笔的镜像（x 或 y 的符号，或 x 与 y 互换），或图像为镜像（ReverseX、ReverseY）</translation>
     </message>
     <message>
         <source>the LED file is a mirror image of the pen (sign of z)</source>
@@ -5988,8 +5988,8 @@
         <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入（{names}）。剩余 {n_views} 个视图。请在视图之间移动标定板。</translation>
     </message>
     <message>
-        <source>{n_leds} LEDs in {n_frames} frames of {name} are not seen: their centres are empty, NaN, (0, 0) or (-1, -1).</source>
-        <translation>{name} 的 {n_frames} 帧中有 {n_leds} 个 LED 未检测到：其中心为空、NaN、(0, 0) 或 (-1, -1)。</translation>
+        <source>{n_leds} LEDs in {n_frames} frames of {name} are not seen: their centres are empty, NaN, (0, 0) or (-1, -1), or marked as not seen.</source>
+        <translation>{name} 的 {n_frames} 帧中有 {n_leds} 个 LED 未检测到：其中心为空、NaN、(0, 0) 或 (-1, -1)，或标记为未检测到。</translation>
     </message>
     <message>
         <source>{n_left_out} of {n_poses} poses are outliers and were excluded: {poses}. Check the tracking for disturbances, and whether tip, cone or tracker moved.</source>
@@ -6064,8 +6064,8 @@
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
     </message>
     <message>
-        <source>{name} has levels above {most}, the highest that it states: the two bytes of each value are probably exchanged. Save the images with the high byte first, or as PNG.</source>
-        <translation>{name} 中有高于 {most}（文件声明的最高值）的灰度值：每个值的两个字节可能颠倒了。请以高字节在前保存图像，或保存为 PNG。</translation>
+        <source>The two bytes of each value in {name} are probably exchanged, by its levels. Save the images with the high byte first.</source>
+        <translation>从灰度值看，{name} 中每个值的两个字节可能颠倒了。请以高字节在前保存图像。</translation>
     </message>
     <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
@@ -7268,8 +7268,8 @@
         <translation>各姿态下该点的（最大 - 最小）/ 2：u {u:.4f}，v {v:.4f}，w {w:.4f} mm。</translation>
     </message>
     <message>
-        <source>All centres in {name} are between 0 and 1: they seem to be shares of the image. Write them in pixels, (0, 0) being the centre of the first.</source>
-        <translation>{name} 中的所有中心都在 0 与 1 之间：它们似乎是占图像的比例。请以像素为单位写出，(0, 0) 为第一个像素的中心。</translation>
+        <source>No centre in {name} is beyond {size:.3g}: they seem to be shares of the image, or in mm on the sensor. Write them in pixels, (0, 0) being the centre of the first.</source>
+        <translation>{name} 中的所有中心都不超过 {size:.3g}：它们似乎是占图像的比例，或传感器上的毫米数。请以像素为单位写出，(0, 0) 为第一个像素的中心。</translation>
     </message>
     <message>
         <source>An LED file needs one known length. Measure the distance between two LEDs and state it.</source>

@@ -75,6 +75,9 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
         ("frame_index,particle,y,x", "7,1,2.5,1.5", "2,1,4,3", "7,3,6,5"),
         ("frame,led,x,y", "[-],[-],[px],[px]", "7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
+        (HEADER, "7,1,1.5,2.5", HEADER.upper(), "2,1,3,4", "7,3,5,6"),
+        (HEADER + ",visible", "7,1,1.5,2.5,1", "2,1,3,4,1", "7,3,5,6,1", "7,2,8,9,0"),
+        (HEADER + ",track,invalid", *("7,1,1.5,2.5,0,0", "2,1,3,4,0,0", "7,3,5,6,0,0")),
     ],
     ids=[
         *("header", "no header", "other order", "more columns"),
@@ -86,6 +89,9 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             "with units",
             "of trackpy",
             "units",
+            "joined",
+            "not visible",
+            "numbers of tracks",
         ),
     ],
 )
@@ -136,9 +142,12 @@ def test_names_of_leds_without_order_are_refused(tmp_path: Path) -> None:
     assert "Number the LEDs" in refusal
 
 
-def test_shares_of_an_image_are_no_pixels(tmp_path: Path) -> None:
-    rows = [f"{n},1,{0.4 + n / 100},0.5" for n in range(30)]
-    assert "shares of the image" in refusal_of_centers(tmp_path, HEADER, *rows)
+@pytest.mark.parametrize("least", [0.4, -2.1])
+def test_shares_of_an_image_are_no_pixels(tmp_path: Path, least: float) -> None:
+    rows = [f"{n},1,{least + n / 100},0.5" for n in range(30)]
+    assert "shares of the image, or in mm" in refusal_of_centers(
+        tmp_path, HEADER, *rows
+    )
 
 
 def test_json_is_named_where_a_table_is_read(tmp_path: Path) -> None:
@@ -150,6 +159,7 @@ def test_json_is_named_where_a_table_is_read(tmp_path: Path) -> None:
     [
         ('<?xml version="1.0"?>\n<TrackMate version="7">', "TrackMate"),
         ("<Kinovea>", "XML"),
+        ("LABEL,ID,TRACK_ID,QUALITY\nLabel,Spot ID,Track ID,Quality\n", "TrackMate"),
         ("NO_OF_FRAMES\t60", "Qualisys"),
         ("Format Version,1.23,Take Name,a", "Motive"),
         ("Trajectories\n100\n,,Pen:1,,", "Vicon"),
@@ -226,7 +236,7 @@ def test_the_first_led_given_twice_is_named_with_both_lines(tmp_path: Path) -> N
 
 
 def test_more_frames_than_any_swing_has_are_refused(tmp_path: Path) -> None:
-    lines = [f"{n},1,2,3" for n in range(30_001)]
+    lines = [f"{n},1,200,3" for n in range(30_001)]
     assert "has 30001 frames; at most 5000" in refusal_of_centers(tmp_path, *lines)
 
 

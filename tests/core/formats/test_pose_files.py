@@ -81,6 +81,13 @@ def matrices() -> list[str]:
     return [line.replace("\t", ",") for line in rows(whole.reshape(N_POSES, 16))]
 
 
+def matrices_by_columns() -> list[str]:
+    whole = np.tile(np.eye(4), (N_POSES, 1, 1))
+    whole[:, :3, :3], whole[:, :3, 3] = ROTATIONS.as_matrix(), MOVED
+    names = "\t".join(f"m{i}{j}" for i in range(4) for j in range(4))
+    return [names, *rows(np.swapaxes(whole, 1, 2).reshape(N_POSES, 16))]
+
+
 def vectors() -> list[str]:
     header = "frame\trvec_x\trvec_y\trvec_z\ttvec_x\ttvec_y\ttvec_z"
     return [header, *rows(np.arange(N_POSES), ROTATIONS.as_rotvec(), MOVED)]
@@ -102,6 +109,7 @@ def named_by_tool() -> list[str]:
             scalar_first,
             tum,
             matrices,
+            matrices_by_columns,
             vectors,
             named_by_tool,
         ),
@@ -169,6 +177,19 @@ def test_translations_in_an_unknown_unit_are_refused(tmp_path: Path) -> None:
         read_poses(path)
 
 
+@pytest.mark.parametrize("name", ["tag_id", "id", "child_frame_id"])
+def test_the_pen_is_chosen_among_tags(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "tags.tsv"
+    header = f"frame_id\t{name}\ttx_mm\tty_mm\ttz_mm\tqx\tqy\tqz\tqw"
+    pen = rows(np.arange(N_POSES), [7] * N_POSES, MOVED, QUATERNIONS)
+    still = rows(np.arange(N_POSES), [3] * N_POSES, MOVED * 0 + 9, QUATERNIONS)
+    path.write_text("\n".join([header, *chain(*zip(still, pen, strict=True)), ""]))
+
+    with pytest.raises(FileError, match="2 tools: 3, 7"):
+        read_poses(path)
+    np.testing.assert_allclose(read_poses(path, "7").translations, MOVED)
+
+
 def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> None:
     states = ["OK"] * N_POSES
     states[LOST] = "Missing"
@@ -217,6 +238,7 @@ def test_a_pose_that_a_flag_calls_invalid_is_left_out(
         (b"6, 12, empivot.txt\n  1.0,  2.0,  3.0\n", "CIS"),
         (b"Format Version,1.23\n\n,Type,Marker\nFrame,Time,X\n", "Motive"),
         (b"HIERARCHY\nROOT pen\n", "BVH"),
+        (b"p[0.143, -0.2, 1.5, 0.1, 0.2, 0.3]\n", "Universal Robots"),
         (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
     ],
 )
