@@ -84,7 +84,7 @@ def matrices() -> list[str]:
 def matrices_by_columns() -> list[str]:
     whole = np.tile(np.eye(4), (N_POSES, 1, 1))
     whole[:, :3, :3], whole[:, :3, 3] = ROTATIONS.as_matrix(), MOVED
-    names = "\t".join(f"m{i}{j}" for i in range(4) for j in range(4))
+    names = "\t".join(f"M[{i},{j}]" for i in range(4) for j in range(4))
     return [names, *rows(np.swapaxes(whole, 1, 2).reshape(N_POSES, 16))]
 
 
