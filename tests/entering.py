@@ -6,8 +6,11 @@ from hashlib import sha256
 from pathlib import Path
 
 from msgspec import structs
+from sqlalchemy import select
 
+from lightpen.archive.chains import READ, StoredEntry, read_entries
 from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import ENTRIES, RECORDS, Database
 from lightpen.record.library.library_changes import Author, change_item
 from lightpen.record.library.signing import (
     OwedFile,
@@ -23,6 +26,17 @@ def enter_in(data: Path) -> None:
     """Enter everything that is owed, as a start of the program does."""
     with closing(Logbook(data)) as logbook:
         assert logbook.enter_owed() == ()
+
+
+def entries_of(database: Database, chain: str) -> tuple[StoredEntry, ...]:
+    """Return the entries of a chain, in their order."""
+    wanted = select(*READ).where(ENTRIES.c.chain == chain).order_by(ENTRIES.c.number)
+    return read_entries(database, wanted)
+
+
+def records_in(database: Database) -> dict[str, str]:
+    """Return all records of an archive, by their hash."""
+    return {row.sha256: row.text for row in database.rows(select(RECORDS))}
 
 
 def put_in(data: Path, file: Path, content: bytes) -> None:

@@ -20,7 +20,7 @@ from msgspec import structs
 from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
 from tests.core.archive.test_station_events import keep
-from tests.entering import enter_in, retire_item
+from tests.entering import enter_in, entries_of, retire_item
 
 from lightpen.archive.chains import (
     ChainHead,
@@ -58,7 +58,6 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.library.tip_library import ItemKind, ListedTip, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen_extensions.plant.copies import entries_of
 
 EVE = Signature("Eve", "correct horse")
 BY = Author("Hall 2", "Ann", signature=EVE)

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 from tests.accepted_tip import accept_tip
+from tests.entering import entries_of
 from tests.simulated_centers import simulate_centers
 
 from lightpen.archive.chains import Event, chain_at_home
@@ -24,7 +25,6 @@ from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.plant.copies import entries_of
 from lightpen_extensions.simulator.swings import PAPER_TIP, swing_poses
 
 Run: TypeAlias = Callable[..., CompletedProcess[str]]

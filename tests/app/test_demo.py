@@ -12,15 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
-from tests.verifying import found_by
 
 from lightpen.model.limits import SwingLimits
 from lightpen_app.work.settings import Settings, Station
-from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.simulator import demo as demo_module
 from lightpen_app_extensions.simulator.demo import NAMES, Demo
-from lightpen_extensions.measure.probing_operator import plate_plan
-from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:
@@ -131,6 +127,12 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
 def test_a_demo_that_is_watched_measures_the_plate_without_a_hand(
     open_wizard: "OpenWizard", qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from tests.verifying import found_by
+
+    from lightpen_app_extensions.measure.service import MeasureService
+    from lightpen_extensions.measure.probing_operator import plate_plan
+    from lightpen_extensions.measure.tasks.part import PART
+
     monkeypatch.setattr(demo_module, "WATCHED_S", 0.1)
     walker = open_wizard()
     demo = Demo(walker.window, walker.workbench, walker.services)

@@ -1,6 +1,7 @@
 """Every dialog fits a screen of 1280 x 800 at 150 %, and clips no words."""
 
 from collections.abc import Callable
+from pkgutil import resolve_name
 
 import pytest
 from PySide6.QtCore import QSize
@@ -15,9 +16,6 @@ from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, LimitsDialog
 from lightpen_app.widgets.fitting import FRAME, DialogScroll, fitted_place
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.boards.window import BoardWindow
-from lightpen_app_extensions.exports.laboratory_dialog import LaboratoryDialog
-from lightpen_app_extensions.stream.service import StreamDialog
 from lightpen_extensions.simulator.swings import paper_camera
 
 SMALL = QSize(853, 533)  # 1280 x 800 at 150 %
@@ -34,12 +32,19 @@ def library_form(workbench: Workbench) -> LibraryDialog:
     return dialog
 
 
+def made(name: str, *given: object) -> QWidget:
+    dialog: QWidget = resolve_name(f"lightpen_app_extensions.{name}")(*given)
+    return dialog
+
+
 MADE: dict[str, Made] = {
     "about": lambda _: About({"Python": "3.11", "Qt": "6.11"}),
-    "stream": lambda _: StreamDialog(),
+    "stream": lambda _: made("stream.service:StreamDialog"),
     "help": lambda _: HelpWindow(),
-    "board": lambda workbench: BoardWindow(workbench.live, workbench.save_place),
-    "laboratory": lambda _: LaboratoryDialog(None),
+    "board": lambda workbench: made(
+        "boards.window:BoardWindow", workbench.live, workbench.save_place
+    ),
+    "laboratory": lambda _: made("exports.laboratory_dialog:LaboratoryDialog", None),
     "part of the sensor": lambda _: PartDialog(paper_camera()),
     "assumptions": lambda _: AssumptionsDialog(),
     "limits": lambda _: LimitsDialog(),

@@ -13,7 +13,6 @@ from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 
@@ -35,7 +34,7 @@ def prepared(
 
 @pytest.fixture
 def notifications(qapp: QApplication) -> Notifications:
-    """What is published by a run, a verification and a live view."""
+    """What is published by a run and a live view."""
     return Notifications()
 
 
@@ -48,20 +47,6 @@ def run(
     yield run
     run.runner.shut_down()
     assert run.runner.await_end(60.0)
-    QApplication.processEvents()
-
-
-@pytest.fixture
-def verification(
-    run: SwingRun, tmp_path: Path, notifications: Notifications
-) -> Iterator[VerificationRun]:
-    """A verification of what the run puts in force."""
-    verification = VerificationRun(
-        *(run.archive, tmp_path / "run", lambda: NOON, notifications)
-    )
-    yield verification
-    verification.runner.shut_down()
-    assert verification.runner.await_end(60.0)
     QApplication.processEvents()
 
 

@@ -30,9 +30,7 @@ from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.work.job import Notifications
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app_extensions.measure.service import VerificationRun
 from lightpen_extensions.simulator.hand import SimulatedOperator
-from lightpen_extensions.stream.server import PoseStream
 
 TIMEOUT = 60.0  # s until a test gives up
 SIGNALS = (*("image_shown", "connection_changed", "settings_applied"),)
@@ -55,12 +53,8 @@ class Diary:
 
 
 @pytest.fixture
-def view(
-    run: SwingRun, verification: VerificationRun, notifications: Notifications
-) -> Iterator[LiveView]:
+def view(run: SwingRun, notifications: Notifications) -> Iterator[LiveView]:
     view = LiveView(run, notifications)
-    view.add_capture(verification.runner)
-    view.add_listener(PoseStream())
     yield view
     view.close()
     view.await_closed()

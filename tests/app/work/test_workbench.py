@@ -30,9 +30,7 @@ from lightpen.swing.status import SwingStatus
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.work.settings import FilePaths, Settings, StoredCamera
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.stream.service import StreamService
 from lightpen_extensions.simulator.simulator import SceneSimulator
-from lightpen_extensions.stream.server import StreamPlace
 
 OTHER = Names("Hall 3", "Bo", "LP-05", "T-11", "C-2", 6.0)
 MASK = np.array([[101.25, 0.1, 12.0], [1e-3, 700.0, 1 / 3]])
@@ -433,6 +431,9 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
 
 
 def test_what_is_reported_after_shutting_down_begins_nothing(stage: Stage) -> None:
+    from lightpen_app_extensions.stream.service import StreamService
+    from lightpen_extensions.stream.server import StreamPlace
+
     workbench = stage.workbench
     stream = StreamService(workbench)
     stream.streaming.want(StreamPlace(port=0))  # a job that tells of its end later

@@ -10,6 +10,7 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from tests.core.archive.test_logbook import checked, result
+from tests.entering import entries_of, records_in
 
 from lightpen.archive.chains import ChainHead, Kind, StoredEntry, chained
 from lightpen.archive.history import messages_on
@@ -29,8 +30,6 @@ from lightpen.record.library.supervision import (
 )
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
-from lightpen_extensions.plant.copies import copy_entries, entries_of, records_of
-from lightpen_extensions.plant.server import open_server
 
 
 @pytest.fixture
@@ -185,12 +184,14 @@ def test_a_key_that_a_supervisor_approves_continues_the_chain(
 def test_a_key_that_was_replaced_signs_nothing_more(
     data: Path, logbook: Logbook, postgres: Postgres
 ) -> None:
+    from lightpen_extensions.plant.copies import copy_entries
+    from lightpen_extensions.plant.server import open_server
+
     old = station_key(logbook.chain)
     assert old is not None
     renew_station_key(data, logbook.chain, None, local_now())
     logbook.enter_owed()
     *_, last = known = entries(logbook)
-    records = records_of(logbook.database, known)
     head = ChainHead(logbook.chain, len(known), last.sha256, last.entry.since)
     entry = chained(head, structs.replace(last.entry.event, kind=Kind.NOTE))
     signature = old.public + old.sign(b"lightpen entry\n" + entry.sha256.encode())
@@ -198,9 +199,9 @@ def test_a_key_that_was_replaced_signs_nothing_more(
 
     role = postgres.new_role(postgres.new_database(), "lightpen_station")
     with closing(open_server(role)) as server:
-        copy_entries(server, logbook.chain, known, records)
+        copy_entries(server, logbook.chain, known, records_in(logbook.database))
         with pytest.raises(ArchiveError, match="signed by a key that is not the stat"):
-            copy_entries(server, logbook.chain, [forged], records)
+            copy_entries(server, logbook.chain, [forged], {})
 
 
 def test_no_new_key_begins_where_the_limits_of_the_archive_are_gone(

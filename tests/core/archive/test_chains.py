@@ -9,6 +9,7 @@ from pathlib import Path
 
 from msgspec import structs
 from tests.core.archive.conftest import NOON, Station, accepted
+from tests.entering import entries_of
 
 from lightpen.archive.chains import (
     FileHash,
@@ -21,7 +22,6 @@ from lightpen.archive.chains import (
 from lightpen.archive.history import EntryFilter, last_accepted, n_wanted, newest
 from lightpen.archive.store import open_file
 from lightpen.record.library.entered_files import NOTHING_BEFORE
-from lightpen_extensions.plant.copies import entries_of
 
 N_EACH = 20
 

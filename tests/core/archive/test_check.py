@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from tests.core.archive.conftest import Station
+from tests.entering import entries_of, records_in
 
 from lightpen.archive.chains import chain_names
 from lightpen.archive.checks import check_archive, check_file
 from lightpen.archive.store import look_into
 from lightpen.errors import ArchiveError
-from lightpen_extensions.plant.copies import entries_of, records_of
 
 N_FLIPS = 60
 
@@ -168,8 +168,7 @@ def test_a_byte_changed_anywhere_in_the_file_is_found_or_changes_nothing(
 def content(archive: Path) -> list[object]:
     with closing(look_into(archive)) as database:
         (chain,) = chain_names(database)
-        entries = list(entries_of(database, chain))
-        return [*entries, records_of(database, entries)]
+        return [*entries_of(database, chain), records_in(database)]
 
 
 def test_last_entries_that_were_taken_out_with_all_that_tells_of_them_are_named(

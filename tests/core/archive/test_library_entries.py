@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
-from tests.entering import retire_item
+from tests.entering import entries_of, retire_item
 
 from lightpen.archive.chains import Entry, Kind, append
 from lightpen.archive.checks import check_archive
@@ -27,7 +27,6 @@ from lightpen.record.library.tip_library import (
     TipStatus,
     library_files,
 )
-from lightpen_extensions.plant.copies import entries_of
 
 ANN = Author("Hall 2", "Ann", "bought in May")
 RULE = DueRule(30)

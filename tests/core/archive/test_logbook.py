@@ -12,6 +12,7 @@ import pytest
 from benchmarks.small_records import small_record
 from msgspec import structs
 from tests.core.archive.conftest import NOON
+from tests.entering import entries_of, records_in
 
 from lightpen.archive.chains import Entry, Kind
 from lightpen.archive.checks import ArchiveCheckResult, check_archive
@@ -27,7 +28,6 @@ from lightpen.record.results.results import Result
 from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import discard_damaged, discard_swing
 from lightpen.record.swings.reading import open_record
-from lightpen_extensions.plant.copies import entries_of, records_of
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
@@ -92,8 +92,7 @@ def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
         *("header.json", "journal.jsonl", "camera.yaml", "pen.json")
     ]
     assert event.settings["min_images"] == 20
-    (written,) = entries_of(logbook.database, logbook.chain)
-    (record,) = records_of(logbook.database, [written]).values()
+    (record,) = records_in(logbook.database).values()
     assert '"tip_pen_mm": [0.0, 2.0, 3.0]' in record
 
 

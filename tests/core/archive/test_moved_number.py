@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 from tests.core.archive.conftest import Station
+from tests.entering import entries_of
 
 from lightpen.archive.checks import check_archive
 from lightpen.errors import ArchiveError
-from lightpen_extensions.plant.copies import entries_of
-from lightpen_extensions.plant.server import deliver, fetch
 
 MOVE = text(
     "UPDATE archive_entries SET number = number + 1"
@@ -39,13 +38,15 @@ def test_a_check_names_the_entry_and_ends(moved: Station, tmp_path: Path) -> Non
 @pytest.mark.timeout(60)
 def test_entries_are_read_up_to_it(moved: Station, tmp_path: Path) -> None:
     with pytest.raises(ArchiveError, match="Entry 4"):
-        list(entries_of(moved.database, moved.chain))
+        entries_of(moved.database, moved.chain)
 
 
 @pytest.mark.timeout(60)
 def test_neither_delivery_nor_fetching_follows_it(
     moved: Station, make_station: Callable[[str], Station], tmp_path: Path
 ) -> None:
+    from lightpen_extensions.plant.server import deliver, fetch
+
     other = make_station("other")
     with pytest.raises(ArchiveError, match="Entry 4"):
         deliver(moved.database, moved.chain, other.database)

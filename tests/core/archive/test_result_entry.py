@@ -94,6 +94,7 @@ def test_an_archive_that_was_removed_is_reported(results: list[Path]) -> None:
 def test_an_export_says_that_a_result_has_no_entry(
     results: list[Path], tmp_path: Path, lightpen: Callable[..., object]
 ) -> None:
+    pytest.importorskip("lightpen_extensions.exports")
     copied, out = tmp_path / "copied.json", tmp_path / "tip.txt"
     copied.write_bytes(results[0].read_bytes())
 

@@ -7,18 +7,17 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from sqlalchemy import update
 from tests.core.archive.conftest import Station, accepted
+from tests.entering import entries_of, records_in
 
 from lightpen.archive.chains import ChainHead, StoredEntry, chained
 from lightpen.archive.checks import check_archive
 from lightpen.archive.store import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing import key_folder, make_station_key
-from lightpen_extensions.plant.copies import copy_entries, entries_of, records_of
-from lightpen_extensions.plant.server import open_server
 
 
 def head_of(station: Station) -> ChainHead:
-    last = list(entries_of(station.database, station.chain))[-1]
+    last = entries_of(station.database, station.chain)[-1]
     entry = last.entry
     return ChainHead(entry.chain, entry.number, last.sha256, entry.since)
 
@@ -35,12 +34,15 @@ def forged(station: Station, n: int) -> tuple[StoredEntry, dict[str, str]]:
 def test_nobody_else_continues_the_chain_of_a_station(
     station: Station, postgres: Postgres
 ) -> None:
+    from lightpen_extensions.plant.copies import copy_entries
+    from lightpen_extensions.plant.server import open_server
+
     known = station.enter(3)
     role = postgres.new_role(postgres.new_database(), "lightpen_station")
     entry, records = forged(station, 3)
     unsigned = replace(entry, signature="")
     with closing(open_server(role)) as there:
-        copy_entries(there, station.chain, known, records_of(station.database, known))
+        copy_entries(there, station.chain, known, records_in(station.database))
         with pytest.raises(ArchiveError, match="signed by a key that is not the stat"):
             copy_entries(there, station.chain, [entry], records)
         with pytest.raises(ArchiveError, match="missing or wrong"):
@@ -71,4 +73,4 @@ def test_nothing_is_entered_without_the_key_of_the_station(station: Station) -> 
     (key_folder() / f"{station.chain}.key").unlink()
     with pytest.raises(ArchiveError, match="not in this user account"):
         station.enter(1, 1)
-    assert len(list(entries_of(station.database, station.chain))) == 1
+    assert len(entries_of(station.database, station.chain)) == 1

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.core.archive.conftest import NOON
+from tests.entering import entries_of, records_in
 
 from lightpen.archive.chains import Event, Kind
 from lightpen.archive.checks import check_archive
@@ -29,11 +30,6 @@ from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.supervision import Signature, save_limits, set_password
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.header import Names
-from lightpen_extensions.comparisons.assessment import (
-    VerificationAssessment,
-    verification_record,
-)
-from lightpen_extensions.plant.copies import entries_of, records_of
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")
@@ -55,6 +51,11 @@ def events(logbook: Logbook) -> list[Event]:
 
 def keep(data: Path, grade: Grade, folder: str = VERIFICATIONS) -> Path:
     """Keep a verification as the step Verify does."""
+    from lightpen_extensions.comparisons.assessment import (
+        VerificationAssessment,
+        verification_record,
+    )
+
     reported = message("file.image")
     record = verification_record(
         "circle",
@@ -84,8 +85,7 @@ def test_a_verification_is_entered_with_who_what_and_the_hash_of_each_image(
     assert event.settings == {"verified": "circle", "max_radius_mm": 0.01}
     assert event.why is not None
     assert event.why.text == "image"
-    written = tuple(entries_of(logbook.database, logbook.chain))
-    (record,) = records_of(logbook.database, written).values()
+    (record,) = records_in(logbook.database).values()
     assert json.loads(record)["inputs"]["images"][0]["sha256"] == HASH
 
 
@@ -122,8 +122,7 @@ def test_the_calibration_of_a_camera_is_entered(
     assert (event.kind, event.at) == (Kind.CAMERA, NOON)
     assert event.settings == {"board": "chessboard:7x5:20", "camera": "21538392"}
     assert (event.names.station, event.names.operator) == ("Hall 2", "Ann")
-    written = tuple(entries_of(logbook.database, logbook.chain))
-    (record,) = records_of(logbook.database, written).values()
+    (record,) = records_in(logbook.database).values()
     assert json.loads(record)["inputs"]["images"] == [{"file": "1", "sha256": HASH}]
 
 

@@ -3,15 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.accepted_tip import Hold, Holder, seen_by
+from tests.accepted_tip import seen_by
 from tests.simulated_rigs import from_first, row_of_cameras
 
-from lightpen.detection.pen_detection import unseen
 from lightpen.detection.pose import fit_poses
-from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import fit_rig_poses
-from lightpen.model.rigid import rig_of
-from lightpen_extensions.measure.probing.instruments import see_together
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 RIG = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))
@@ -54,34 +50,3 @@ def test_a_second_camera_sees_the_depth_that_one_hardly_sees() -> None:
 
     depth = np.sqrt([each.covariances[:, 5, 5].mean() for each in (alone, together)])
     assert depth[0] > 3 * depth[1]
-
-
-def test_a_camera_that_does_not_see_the_pen_counts_for_nothing() -> None:
-    (detection,) = Holder(RIG, PEN).still(Hold(), 1)
-    lost = replace(detection, others=(unseen(PEN, Reason.EMPTY),))
-    together = see_together(RIG, PEN, lost)
-
-    assert together.has_pose
-    np.testing.assert_allclose(together.translation, detection.translation, atol=1e-6)
-    assert not np.isfinite(together.rig_pixels[1]).any()
-
-
-def test_what_only_the_second_camera_sees_is_in_the_frame_of_the_first() -> None:
-    (detection,) = Holder(RIG, PEN).still(Hold(), 1)
-    lost = replace(unseen(PEN, Reason.EMPTY), others=detection.others)
-    together = see_together(RIG, PEN, lost)
-
-    assert together.has_pose
-    np.testing.assert_allclose(together.translation, detection.translation, atol=0.5)
-
-
-def test_what_no_camera_sees_stays_unseen() -> None:
-    nothing = unseen(PEN, Reason.EMPTY)
-    together = see_together(RIG, PEN, replace(nothing, others=(nothing,)))
-
-    assert together.reason is Reason.EMPTY
-
-
-def test_a_camera_alone_is_as_it_is() -> None:
-    (detection,) = Holder(rig_of(RIG.cameras[0]), PEN).still(Hold(), 1)
-    assert see_together(rig_of(RIG.cameras[0]), PEN, detection) is detection

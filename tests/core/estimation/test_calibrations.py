@@ -17,7 +17,6 @@ from lightpen.estimation.uncertainty.prediction import predict_uncertainty
 from lightpen.formats.opened_files import InputFile, Inputs
 from lightpen.messages import Code
 from lightpen.model.limits import USUAL, SwingLimits
-from lightpen_extensions.comparisons.monte_carlo import run_trial, trials_of
 from lightpen_extensions.simulator.swings import paper_pen
 
 FILE = InputFile(Path("file"), 64 * "0")
@@ -132,6 +131,8 @@ def test_u_predicted_from_linear_equations_is_that_of_the_calibration(
 
 @pytest.mark.parametrize("name", ["restless", "usual", "loose"])
 def test_errors_of_trials_are_what_u_says(name: str, calibrated: Calibrated) -> None:
+    from lightpen_extensions.comparisons.monte_carlo import run_trial, trials_of
+
     found = calibrated(name)
     trials = trials_of(found)
     errors = np.array([run_trial(trials, number) for number in range(4)])

@@ -31,7 +31,6 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen_extensions.simulator.camera import SkippingClock
-from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -208,6 +207,8 @@ def test_nobody_looking_on_one_image_is_looked_at_and_no_more(
 def test_while_others_listen_every_image_is_looked_at_though_nobody_looks_on(
     make_live: MakeLive, screen: Screen
 ) -> None:
+    from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
+
     stream = PoseStream()
     stream.open(StreamPlace(port=0))
     assert stream.status.place is not None

@@ -36,8 +36,6 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen_extensions.drivers.aravis import AravisDevice
-from lightpen_extensions.drivers.device_camera import DeviceCamera
 from lightpen_extensions.simulator.scenes import Scene, beside
 
 if TYPE_CHECKING:
@@ -297,12 +295,18 @@ def gige_pair(
     second.unplug()
 
 
+def gige_cameras() -> list[ImageCamera]:
+    from lightpen_extensions.drivers.aravis import AravisDevice
+    from lightpen_extensions.drivers.device_camera import DeviceCamera
+
+    return [DeviceCamera(AravisDevice(each)) for each in (ADDRESS, SECOND_ADDRESS)]
+
+
 @pytest.mark.slow
 def test_two_cameras_are_still_paired_when_nothing_has_moved_for_long(
     gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:
-    places = (ADDRESS, SECOND_ADDRESS)
-    make_live([DeviceCamera(AravisDevice(place)) for place in places])
+    make_live(gige_cameras())
     screen.wait_for_moments(1)
     began_ns = screen.shown_ns()[0]
     screen.wait_until(lambda: screen.shown_ns()[-1] - began_ns > LIVELY_NS)
@@ -327,8 +331,7 @@ def period_ms(images: Sequence[LiveImage]) -> float:
 def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
     gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:
-    places = (ADDRESS, SECOND_ADDRESS)
-    live = make_live([DeviceCamera(AravisDevice(place)) for place in places])
+    live = make_live(gige_cameras())
     screen.wait_for_moments(12)
     for one, other in screen.moments():
         assert one.frame.image[0, 0] == 10

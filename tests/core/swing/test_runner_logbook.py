@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests.core.conftest import TIMEOUT, Station
+from tests.entering import entries_of
 
 from lightpen.archive.chains import Event, Kind, chain_names
 from lightpen.archive.checks import check_archive
@@ -16,7 +17,6 @@ from lightpen.archive.store import look_into
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner
-from lightpen_extensions.plant.copies import entries_of
 
 
 @pytest.fixture

@@ -549,6 +549,9 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
     assert exposure(live) == "No LED detected"
     assert live.named("Folder, record or video").hasFocus()
 
+
+def test_a_camera_of_a_driver_asks_for_a_search(live: "Seen") -> None:
+    pytest.importorskip("lightpen_extensions.drivers")
     live.choose("GenICam with a vendor's GenTL producer")
     live.wait("Search for the camera and choose it.")
 

@@ -66,18 +66,7 @@ from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.comparisons.selection_panel import SelectionPanel
-from lightpen_app_extensions.comparisons.service import ComparisonsService
-from lightpen_app_extensions.report.control import PrintReportWindow
-from lightpen_app_extensions.report.service import ReportService
-from lightpen_extensions.comparisons.assessment import (
-    USE_TIP,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-    keep_verification,
-    verification_record,
-)
-from lightpen_extensions.plant.server import Replicator
+from lightpen_program.extensions import faces
 from lightpen_resources import languages
 
 if TYPE_CHECKING:
@@ -85,7 +74,7 @@ if TYPE_CHECKING:
 
 W = TypeVar("W", bound=QWidget)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
-TRENDS, ENTRY, SELECTION, DUE, WHOLE = range(5)
+TRENDS, ENTRY, SELECTION, DUE, WHOLE = 0, 1, 2, -2, -1  # places of tabs
 MANY = 450
 FLAGS = QItemSelectionModel.SelectionFlag
 
@@ -108,8 +97,7 @@ class Desk:
 
     def __init__(self, workbench: Workbench, qtbot: QtBot) -> None:
         self.workbench, self.qtbot = workbench, qtbot
-        kinds = VerifiedKinds(workbench), ComparisonsService(workbench)
-        services = *kinds, ReportService(workbench)
+        services = VerifiedKinds(workbench), *(make(workbench) for make in faces())
         self.page = HistoryPage(workbench, services)
         self.notices: list[str] = []
         self.statuses: list[str] = []
@@ -176,7 +164,8 @@ class Desk:
             chosen.setCurrentIndex(index, how | FLAGS.Rows)
 
     def show_tab(self, tab: int) -> None:
-        self.child(QTabWidget).setCurrentIndex(tab)
+        tabs = self.child(QTabWidget)
+        tabs.setCurrentIndex(tab % tabs.count())
 
     def button(self, text: str) -> QPushButton:
         """Return the button that is seen with a text."""
@@ -332,6 +321,8 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
 def test_a_server_that_cannot_be_reached_is_reported_without_the_password(
     desk: Desk,
 ) -> None:
+    from lightpen_extensions.plant.server import Replicator
+
     folder = desk.workbench.folder
     away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
     desk.workbench.run.logbook = LazyLogbook(
@@ -444,12 +435,14 @@ def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     assert panel.words().startswith("Pen LP-04, tip T-11: one calibration, 2026-01")
 
 
-def said_in(panel: SelectionPanel) -> str:
+def said_in(panel: QWidget) -> str:
     labels = [each for each in panel.findChildren(QLabel) if each.isVisibleTo(panel)]
     return " ".join(unbroken(each.text()) for each in labels)
 
 
 def test_two_that_are_selected_are_compared(desk: Desk) -> None:
+    from lightpen_app_extensions.comparisons.selection_panel import SelectionPanel
+
     desk.enter(3)
     desk.open()
     desk.show_tab(SELECTION)
@@ -560,6 +553,8 @@ def store(folder: Path, n: int) -> Result:
 def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     desk: Desk, stated: dict[str, Any]
 ) -> None:
+    from lightpen_app_extensions.report.control import PrintReportWindow
+
     folder = desk.workbench.folder
     result = replace(store(folder, 0), calibration=record_of(stated))
     FolderArchive(folder).store(result)
@@ -622,6 +617,9 @@ def test_a_check_that_is_cancelled_leaves_the_one_before(
 
 
 def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
+    from lightpen_app_extensions.comparisons.selection_panel import SelectionPanel
+    from lightpen_app_extensions.report.control import PrintReportWindow
+
     desk.enter(5)
     desk.open()
     desk.until(lambda: desk.child(SelectionPanel).repeatability() is not None)
@@ -637,6 +635,15 @@ def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
 
 
 def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
+    from lightpen_app_extensions.report.control import PrintReportWindow
+    from lightpen_extensions.comparisons.assessment import (
+        USE_TIP,
+        VERIFY_AGAIN,
+        VerificationAssessment,
+        keep_verification,
+        verification_record,
+    )
+
     verdict = VerificationAssessment(Grade.CHECK, USE_TIP, VERIFY_AGAIN)
     entries = {"pen": "LP-04", "tip": "T-10", "moved_mm": [0.001, 0.002, 0.003]}
     record = verification_record("drift", entries, verdict, {"drift": 0.02}, {})
@@ -655,6 +662,7 @@ def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
 
 
 def test_what_is_not_accepted_has_no_record_on_paper(desk: Desk) -> None:
+    pytest.importorskip("lightpen_app_extensions.report")
     desk.enter(1)
     logbook = desk.workbench.run.logbook.opened()
     append(logbook.database, logbook.chain, Event(Kind.NOTE, NOON, names(""), "1"))

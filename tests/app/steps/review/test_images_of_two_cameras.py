@@ -23,7 +23,6 @@ from lightpen_app.steps.review.residual_plots import ResidualView
 from lightpen_app.widgets.live_markers import CameraSwitch
 from lightpen_app.widgets.result_plots import ArrowPlot
 from lightpen_app.widgets.state_banner import SignLabel
-from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +120,8 @@ def test_two_cameras_need_no_more_width_than_one(
 def test_why_there_is_no_monte_carlo_of_two_cameras_is_seen(
     solution: Solution, qtbot: QtBot
 ) -> None:
+    from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
+
     row = MonteCarloRow()
     qtbot.addWidget(row)
     row.set_value(solution)

@@ -84,13 +84,6 @@ from lightpen_app.widgets.result_plots import BarPlot
 from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
 from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
-from lightpen_app_extensions.comparisons.service import ComparisonsService
-from lightpen_app_extensions.exports.laboratory_dialog import LaboratoryDialog
-from lightpen_app_extensions.exports.service import ExportsService
-from lightpen_app_extensions.report.control import PrintReportWindow
-from lightpen_app_extensions.report.service import ReportService
-from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
@@ -99,6 +92,7 @@ from lightpen_extensions.simulator.swings import (
     Postures,
     swing_from_postures,
 )
+from lightpen_program.extensions import faces
 
 if TYPE_CHECKING:
     from tests.app.conftest import SolvingOn
@@ -227,8 +221,7 @@ class Bed:
     def show(self) -> ReviewPage:
         """Show the page."""
         with undressed():
-            kinds = ExportsService, ReportService, ComparisonsService
-            services = [kind(self.workbench) for kind in kinds]
+            services = [make(self.workbench) for make in faces()]
             page = ReviewPage(self.workbench, services)
         self.pages.append(page)
         self.qtbot.addWidget(page)
@@ -856,6 +849,9 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
 def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
     bed: Bed, tmp_path: Path
 ) -> None:
+    from lightpen_app_extensions.exports.laboratory_dialog import LaboratoryDialog
+    from lightpen_extensions.exports.formats import FORMATS
+
     workbench = bed.solve()
     page = bed.show()
     menus = button(page, "Save...").findChildren(QMenu)
@@ -909,6 +905,8 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
 def test_the_budget_is_checked_by_monte_carlo_on_request(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
+    from lightpen_app_extensions.comparisons.monte_carlo_row import MonteCarloRow
+
     choose_tab(page, "Uncertainty")
     row = the(page, MonteCarloRow)
     type_number(the(row, NumberField), 20)
@@ -1203,6 +1201,8 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
 def test_the_record_on_paper_is_of_the_result_on_the_disk(
     page: ReviewPage, bed: Bed, qtbot: QtBot
 ) -> None:
+    from lightpen_app_extensions.report.control import PrintReportWindow
+
     entry = next(
         action
         for menu in page.findChildren(QMenu)
@@ -1224,6 +1224,7 @@ def test_the_record_on_paper_is_of_the_result_on_the_disk(
 def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
+    pytest.importorskip("lightpen_extensions.comparisons")
     run = workbench.run
     first = run.status
     assert first.solution is not None

@@ -4,16 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_rigs import row_of_cameras
+from tests.accepted_tip import Hold, Holder
+from tests.simulated_rigs import from_first, row_of_cameras
 
+from lightpen.detection.pen_detection import unseen
+from lightpen.detection.reasons import Reason
 from lightpen.model.rigid import rig_of
 from lightpen_extensions.measure.probing.instruments import (
     instrument_of_files,
+    see_together,
     with_rig,
 )
 from lightpen_extensions.simulator.swings import PAPER_TIP, paper_camera, paper_pen
 
 RIG = rig_of(paper_camera())
+BOTH = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))
 PEN = replace(paper_pen(), led_sigma=0.002)
 TIP = np.diag([1e-6, 4e-6, 9e-6])  # mm^2
 LOOSE = replace(PEN, scale_sigma=3e-5, diameter_sigma=0.03)
@@ -77,3 +82,34 @@ def test_an_instrument_before_another_rig_keeps_its_pen_and_tip() -> None:
     assert not found.covariance[np.ix_(others, kept)].any()
     assert (found.rig, found.pen, found.sigma) == (rig, old.pen, old.sigma)
     np.testing.assert_array_equal(found.tip_pen, old.tip_pen)
+
+
+def test_a_camera_that_does_not_see_the_pen_counts_for_nothing() -> None:
+    (detection,) = Holder(BOTH, PEN).still(Hold(), 1)
+    lost = replace(detection, others=(unseen(PEN, Reason.EMPTY),))
+    together = see_together(BOTH, PEN, lost)
+
+    assert together.has_pose
+    np.testing.assert_allclose(together.translation, detection.translation, atol=1e-6)
+    assert not np.isfinite(together.rig_pixels[1]).any()
+
+
+def test_what_only_the_second_camera_sees_is_in_the_frame_of_the_first() -> None:
+    (detection,) = Holder(BOTH, PEN).still(Hold(), 1)
+    lost = replace(unseen(PEN, Reason.EMPTY), others=detection.others)
+    together = see_together(BOTH, PEN, lost)
+
+    assert together.has_pose
+    np.testing.assert_allclose(together.translation, detection.translation, atol=0.5)
+
+
+def test_what_no_camera_sees_stays_unseen() -> None:
+    nothing = unseen(PEN, Reason.EMPTY)
+    together = see_together(BOTH, PEN, replace(nothing, others=(nothing,)))
+
+    assert together.reason is Reason.EMPTY
+
+
+def test_a_camera_alone_is_as_it_is() -> None:
+    (detection,) = Holder(rig_of(BOTH.cameras[0]), PEN).still(Hold(), 1)
+    assert see_together(rig_of(BOTH.cameras[0]), PEN, detection) is detection

@@ -57,7 +57,7 @@ def test_each_query_of_the_dashboard_says_what_was_entered(
 
 
 def test_the_dashboard_has_a_source_that_is_chosen() -> None:
-    file = Path(__file__).parents[3] / "docs" / "grafana" / "plant.json"
+    file = Path(__file__).parents[4] / "docs" / "grafana" / "plant.json"
     content: dict[str, Any] = json.loads(file.read_text("utf-8"))
 
     for panel in content["panels"]:
