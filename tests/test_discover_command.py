@@ -140,5 +140,5 @@ def test_centres_in_millimetres_are_named(
 
     assert main(arguments(centers, "--length", "longest", "180")) != 0
 
-    assert "centres in pixels" in capsys.readouterr().err
+    assert "Write them in pixels" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)

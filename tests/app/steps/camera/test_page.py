@@ -552,6 +552,7 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
 
 def test_a_camera_of_a_driver_asks_for_a_search(live: "Seen") -> None:
     pytest.importorskip("lightpen_extensions.drivers")
+    live.choose("Recorded images")
     live.choose("GenICam with a vendor's GenTL producer")
     live.wait("Search for the camera and choose it.")
 
