@@ -137,6 +137,7 @@ def test_ten_two_stage_calibrations_scatter_as_the_method_must(
     )
 
 
+@pytest.mark.slow
 def test_the_uncertainty_covers_the_error(
     shared_data: Path, record: Record, full: dict[str, Any], truth: Truth
 ) -> None:

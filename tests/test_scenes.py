@@ -102,6 +102,7 @@ def test_no_led_of_a_hard_scene_is_mislabelled(
     assert wrong_leds(record(hard), truth(hard)) == []
 
 
+@pytest.mark.slow
 def test_a_hard_scene_gives_the_tip_to_8_um(
     hard: Path, record: Record, truth: Truth
 ) -> None:

@@ -21,6 +21,8 @@ from lightpen.record.swings.header import Names
 from lightpen_app.widgets.fitting import FRAME
 from lightpen_resources import languages
 
+pytestmark = pytest.mark.slow  # it swings, solves and draws all steps
+
 ROOT = Path(__file__).parents[2]
 DIFFERENT = ROOT / "screens-different"
 
@@ -120,7 +122,6 @@ def pictures(seen: Seen) -> dict[str, QImage]:
     return seen.pictures
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_step_looks_as_it_did(pictures: dict[str, QImage], name: str) -> None:
     expected = QImage(str(SCREENS.FOLDER / name))
@@ -193,7 +194,6 @@ def test_the_tabs_of_the_review_are_all_looked_at(seen: Seen) -> None:
     assert len(seen.rooms["review", "en", 1280]) == 1 + 5
 
 
-@pytest.mark.slow
 def test_long_names_leave_every_step_its_width(
     dressed: QApplication, monkeypatch: pytest.MonkeyPatch
 ) -> None:

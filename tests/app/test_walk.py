@@ -119,9 +119,8 @@ def _begin_with_images(walker: "Walker", folder: Path) -> None:
     walker.until_shows("Camera")
 
 
-@pytest.mark.parametrize(
-    "begins_by_card", [False, pytest.param(True, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("begins_by_card", [False, True])
 def test_a_recorded_swing_gives_its_tip(
     open_wizard: "OpenWizard",
     around: SourceEnvironment,

@@ -142,7 +142,7 @@ def test_a_feature_follows_its_points_as_its_derivative_says(name: str) -> None:
     np.testing.assert_allclose(found, predicted, rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("n_points", [8, 10])
+@pytest.mark.parametrize("n_points", [8, pytest.param(10, marks=pytest.mark.slow)])
 def test_few_points_of_a_cone_or_a_pin_end_in_no_false_minimum(n_points: int) -> None:
     rng = np.random.default_rng(n_points)
     for _ in range(15):
