@@ -75,6 +75,7 @@ def run(tree: Path, folder: Path, *words: str, status: int = 0) -> str:
     path = os.pathsep.join(str(tree / name) for name in ("core", "app", "resources"))
     homes = {f"XDG_{name}_HOME": str(folder) for name in ("CONFIG", "DATA")}
     unseen = {"QT_QPA_PLATFORM": "offscreen", "HOME": str(folder)}
+    unseen["LIGHTPEN_WITHOUT_EXTENSIONS"] = "1"
     around = {**os.environ, **homes, **unseen, "PYTHONPATH": path}
     around.pop("PYTEST_XDIST_WORKER", None)  # no part of the tests here
     done = subprocess.run(

@@ -121,6 +121,22 @@ def test_a_notice_hides_once_it_is_read(qtbot: QtBot) -> None:
     assert not notice.isVisible()
 
 
+def test_a_closed_notice_shows_the_one_before_unless_its_cause_has_ended(
+    qtbot: QtBot,
+) -> None:
+    notice = NoticeBar()
+    qtbot.addWidget(notice)
+    for text in ("The disk is full.", "No camera.", "The server is away."):
+        notice.show_text(text)
+
+    notice.drop("No camera.")
+    assert notice.text() == "The server is away."
+    notice.clear()
+    assert notice.text() == "The disk is full."
+    notice.clear()
+    assert not notice.isVisible()
+
+
 @pytest.mark.parametrize("key", [Qt.Key.Key_PageUp, Qt.Key.Key_PageDown])
 def test_the_keys_of_the_steps_change_no_choice(qtbot: QtBot, key: Qt.Key) -> None:
     field = ChoiceField()
