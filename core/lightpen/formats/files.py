@@ -131,7 +131,7 @@ def read_text(path: Path, what: Message, limit: int) -> str:
 def kind_of(data: bytes, name: str = "") -> str:
     """Return the kind of a file that is not read here, or ``""``.
 
-    It is told by its start, and for images by the end of its ``name`` before.
+    The ending of ``name`` decides first, if it is given, then the first bytes.
     """
     named = foreign_program(name.lower().encode(), "names")[0] if name else ""
     return named or foreign_program(data[:HEAD])[0]

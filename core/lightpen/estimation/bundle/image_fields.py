@@ -99,7 +99,7 @@ NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
 NONE = 0.4  # prior probability that there is no field; else all scales are as likely
 N_SCALES = 40  # standard deviations tried
-SMALLEST = 1e-2  # of the largest one; a smaller one makes no difference
+SMALLEST = 1e-2  # of the largest one; smaller ones count as none
 
 
 class FieldName(StrEnum):
