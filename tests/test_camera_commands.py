@@ -87,6 +87,7 @@ def test_the_rig_file_of_two_cameras_is_read_back(
     assert "Baseline" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_images_that_are_binned_use_a_camera_file_that_is_written(
     shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -65,6 +65,7 @@ def verification(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("qapp")  # text is measured by the fonts of an application
 def test_a_verification_is_put_on_paper(
     script: Callable[..., CompletedProcess[str]], verification: Path, tmp_path: Path
@@ -100,6 +101,7 @@ def test_a_tampered_record_is_not_put_on_paper(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_measured_part_is_put_on_paper(
     script: Callable[..., CompletedProcess[str]], tmp_path: Path
 ) -> None:

@@ -176,6 +176,7 @@ def test_repeatability_is_entered_with_the_tips_it_is_of(
     ]
 
 
+@pytest.mark.slow
 def test_options_never_widen_the_limits_of_a_guarded_station(
     verify: Verify, tmp_path: Path
 ) -> None:

@@ -102,6 +102,7 @@ def test_a_tip_is_found_by_a_part_of_its_name(known: "Walker") -> None:
     assert walker.tells("No tip matches 04x. Press Enter, or clear the search.")
 
 
+@pytest.mark.slow
 def test_what_is_set_up_once_is_a_click_away(known: "Walker") -> None:
     walker = known
     walker.until(lambda: walker.main_button().text().startswith("Swing "))

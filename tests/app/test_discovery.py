@@ -72,6 +72,7 @@ def test_a_click_on_stop_as_the_capture_ends_by_itself_starts_no_other(
     window.close()
 
 
+@pytest.mark.slow
 @pytest.mark.qt_log_ignore("^This plugin does not support ")
 def test_a_computation_that_is_cancelled_leaves_what_was_found_before(
     workbench: Workbench,

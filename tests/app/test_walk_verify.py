@@ -56,6 +56,7 @@ def records(walker: "Walker") -> list[dict[str, Any]]:
     return [json.loads(file.read_bytes()) for file in sorted(folder.glob("*.json"))]
 
 
+@pytest.mark.slow
 def test_every_task_has_room_in_a_window_of_1280_x_800(known: "Walker") -> None:
     walker = known
     walker.window.resize(QSize(1280, 800) - FRAME)

@@ -254,6 +254,7 @@ def test_an_untouched_swing_of_two_cameras_is_checked_without_a_finding(
     assert found.n_files == 7 + 2 * 14
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["images/000002.png", "images-2/000002.png", "camera-2.yaml", "rig.json"]
 )

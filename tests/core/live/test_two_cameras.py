@@ -328,6 +328,7 @@ def period_ms(images: Sequence[LiveImage]) -> float:
     return float(np.median(np.diff(taken_ns) / np.diff(seqs))) * 1e-6
 
 
+@pytest.mark.slow
 def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
     gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:

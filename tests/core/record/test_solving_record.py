@@ -90,6 +90,7 @@ def test_images_put_back_give_the_tip_of_before(folder: Path) -> None:
     assert_same(solve_record(open_record(folder)), before)
 
 
+@pytest.mark.slow
 def test_a_record_goes_by_its_mask(
     folder: Path, rewrite_header: Callable[..., None]
 ) -> None:

@@ -317,6 +317,7 @@ def test_an_image_that_is_kept_is_on_the_disk_when_it_is_reported(
     assert on_disk == [N_IMAGES + 1, N_IMAGES + 2]
 
 
+@pytest.mark.slow
 def test_every_status_is_reported_in_order_with_its_events_by_one_thread(
     station: "Station", interrupted: Path
 ) -> None:
@@ -394,6 +395,7 @@ def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begin
     assert station.status.state is None
 
 
+@pytest.mark.slow
 def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
     station: "Station", interrupted: Path, swung: Callable[..., Path]
 ) -> None:

@@ -395,6 +395,7 @@ def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
     assert len(desk.column(TIP)) == 2
 
 
+@pytest.mark.slow
 def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:
     desk.enter(MANY)
     desk.open()

@@ -530,6 +530,7 @@ def test_the_file_of_another_pen_is_used_after_a_question_only(
     assert not seen.page.is_doubtful()
 
 
+@pytest.mark.slow
 def test_a_file_that_misfits_leaves_the_step_amber_and_asks_before_the_swing(
     live: "Seen", tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -550,6 +551,7 @@ def test_a_file_that_misfits_leaves_the_step_amber_and_asks_before_the_swing(
     assert len(asked) == 1
 
 
+@pytest.mark.slow
 def test_the_question_ends_when_the_pen_fits_after_all(
     seen: "Seen", workbench: Workbench, small_scene: Scene, qtbot: QtBot
 ) -> None:

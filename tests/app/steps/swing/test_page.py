@@ -409,6 +409,7 @@ def test_computing_can_be_stopped_and_begun_again(
 # A long swing, disturbed
 
 
+@pytest.mark.slow
 def test_a_covered_pen_is_reported_and_the_swing_goes_on_by_itself(
     qtbot: QtBot, capturing: Desk
 ) -> None:
@@ -575,6 +576,7 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
     capturing.click("Continue swinging")
 
 
+@pytest.mark.slow
 def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     qtbot: QtBot, capturing: Desk
 ) -> None:

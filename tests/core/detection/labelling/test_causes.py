@@ -94,6 +94,7 @@ def test_a_change_of_the_images_is_named(change, code, pixels: FloatArray) -> No
     assert code in {part.code for part in cause.parts()}
 
 
+@pytest.mark.slow
 def test_nothing_is_named_that_removes_no_misfit(pixels: FloatArray) -> None:
     rng = np.random.default_rng(1)
     noisy = pixels + rng.normal(0, 0.5, pixels.shape)

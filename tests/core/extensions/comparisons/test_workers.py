@@ -18,6 +18,7 @@ def touch_file(place: str) -> None:
     time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_processes_return_what_they_made_in_order_and_tell_how_far_they_are() -> None:
     reported: list[float] = []
 

@@ -321,6 +321,7 @@ def test_a_camera_that_hangs_for_a_moment_is_silent_and_goes_on(
     assert Connection.LOST not in watched.connections
 
 
+@pytest.mark.slow
 def test_a_camera_that_hangs_for_long_is_lost_and_found_again(
     server: Server, watched: Watched
 ) -> None:

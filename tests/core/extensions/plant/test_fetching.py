@@ -80,6 +80,7 @@ def test_an_empty_folder_gets_entries_and_files_byte_by_byte(
     assert all("swing" in each for each in findings(new))
 
 
+@pytest.mark.slow
 def test_a_rolled_back_folder_is_as_before_and_goes_on(
     data: Path, address: str, tmp_path: Path
 ) -> None:

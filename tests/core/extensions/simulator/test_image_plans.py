@@ -127,6 +127,7 @@ def test_dim_and_saturated_images_differ_in_exposure_only() -> None:
     assert peaks[2] == 255
 
 
+@pytest.mark.slow
 def test_clutter_and_fingers_leave_most_leds_whole() -> None:
     wanted = Disturbances(clutter=1.0, fingers=1.0)
     scene = Scene(n_images=12, seed=9)

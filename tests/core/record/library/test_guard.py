@@ -146,6 +146,7 @@ def without_key(data: Path) -> str:
     return name
 
 
+@pytest.mark.slow
 def test_a_lost_station_key_is_replaced_by_a_supervisor_alone(guarded: Path) -> None:
     chain = without_key(guarded)
     with pytest.raises(AcceptanceError, match="approval"):

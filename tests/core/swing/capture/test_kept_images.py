@@ -120,6 +120,7 @@ def test_kept_one_by_one_or_all_at_once_gives_the_same_tip() -> None:
     np.testing.assert_allclose(kept.misfits, together.misfits, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_uncertain_normals_count_from_image_to_image() -> None:
     swing = swing_poses(30, np.random.default_rng(0))
     kept = grown(swing, replace(PEN, normal_covariance=0.3**2 * np.eye(3)))
@@ -147,6 +148,7 @@ def test_slipped_images_are_left_out_and_no_others() -> None:
     assert without_slipped(RIG, PEN, clean)[1] == set()
 
 
+@pytest.mark.slow
 def test_images_from_before_a_slip_need_not_be_far_out() -> None:
     # Half out: between the two gates.
     kept = grown(slipping([38, 39], 0.06))
