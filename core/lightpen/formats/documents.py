@@ -67,7 +67,9 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
 def parse_json(text: str, name: str) -> Tree:
     """Return the tree of a JSON text; see `parse_document`."""
 
-    def entries(pairs: list[tuple[str, Tree]]) -> dict[str, Tree]:
+    def entries(pairs: list[tuple[str, Tree]]) -> Tree:
+        if pairs and all(key == str(i) for i, (key, _) in enumerate(pairs)):
+            return [value for _, value in pairs]  # an array of numbers of JavaScript
         mapping: dict[str, Tree] = {}
         for key, value in pairs:
             if key in mapping:
@@ -183,10 +185,17 @@ def _yaml_document(events: Iterator[Any], name: str) -> Tree:
     for event in events:
         if isinstance(event, yaml.DocumentStartEvent):
             found = _yaml_node(next(events), events, 0, name)
-            if tree is not None and found:
+            if tree is not None and found and _content(found) != _content(tree):
                 raise FileError("yaml.several-documents", name=name)
             tree = tree or found
     return tree
+
+
+def _content(tree: Tree) -> Tree:
+    """Return what the messages of ROS about one thing have in common."""
+    if not isinstance(tree, dict):
+        return tree
+    return {key: value for key, value in tree.items() if key != "header"}
 
 
 def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree:

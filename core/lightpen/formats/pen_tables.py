@@ -161,7 +161,12 @@ def from_table(table: Table, units: str | None) -> PenContent:
     names: tuple[str, ...] = _LED_NAMES
     is_named = any(name in names for name in bare.header)
     if not is_named and bare.header[:1] != ("x",):
-        names += bare.header[:1]  # what a measuring program calls its elements
+        # What a measuring program calls its elements, not their groups.
+        before = range(bare.header.index("x") if "x" in bare.header else 0)
+        own = [
+            i for i in before if len({row[i] for row in bare.rows}) == len(bare.rows)
+        ]
+        names += tuple(bare.header[i] for i in (*own, 0)[:1] if bare.header)
         is_named = True
     wanted = [*_COORDINATES, *(_NORMALS if with_normals else ())]
     columns = bare.columns([names, *wanted][not is_named :], message("table.of-leds"))

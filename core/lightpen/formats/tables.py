@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from itertools import compress
+from itertools import compress, takewhile
 from pathlib import Path
 from typing import NoReturn
 
@@ -309,7 +309,10 @@ def _n_titles(rows: list[list[str]]) -> int:
     n_titles = next(i for i, count in enumerate(filled) if 2 * count > usual)
     if any(map(_looks_numeric, rows[n_titles])) and rows[0] != [str(len(rows) - 1)]:
         return 0  # unless they count the lines below
-    return n_titles
+    words = takewhile(lambda row: not any(map(_looks_numeric, row)), rows[n_titles:])
+    # The last with the most names: units, which are equal, may stand below them.
+    n_names = [(len({*row} - {""}), i) for i, row in enumerate(words)]
+    return n_titles + max(n_names, default=(0, 0))[1]
 
 
 def _moment(cell: str) -> str:

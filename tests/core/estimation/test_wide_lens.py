@@ -1,6 +1,9 @@
 """Tests of a tip before a fisheye."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from tests.simulated_centers import observe_pixels, simulate_centers
 
 from lightpen.estimation.calibrate import calibrate
@@ -19,13 +22,16 @@ N_IMAGES, NOISE = 60, 0.02  # px
 OFF_AXIS = rotation_from_vector(np.radians([15.0, 35.0, 0.0]))
 
 
-def test_a_pen_far_off_the_axis_of_a_fisheye_has_its_tip_within_u() -> None:
+@pytest.mark.parametrize("camera", [FISHEYE, replace(FISHEYE, covariance=None)])
+def test_a_pen_far_off_the_axis_of_a_fisheye_has_its_tip_within_u(
+    camera: Camera,
+) -> None:
     rng = np.random.default_rng(1)
     pen, swing = paper_pen(), swing_poses(N_IMAGES, rng)
     R, t = OFF_AXIS @ swing.rotations, swing.translations @ OFF_AXIS.T
-    pixels = simulate_centers(FISHEYE, pen, R, t, NOISE, rng)
-    observations = observe_pixels(pixels, FISHEYE, pen)
-    found = calibrate(FISHEYE, pen, observations, Assumptions())
+    pixels = simulate_centers(camera, pen, R, t, NOISE, rng)
+    observations = observe_pixels(pixels, camera, pen)
+    found = calibrate(camera, pen, observations, Assumptions())
 
     errors = found.joint.tip_pen - swing.tip_pen
     sigmas = np.sqrt(

@@ -63,6 +63,16 @@ distortion_model: "plumb_bob"
 D: [-0.082, 0.105, 0.0003, -0.0002, 0.3333333333333333]
 K: [4638.2, 0.0, 1219.6, 0.0, 4637.1, 1031.3, 0.0, 0.0, 1.0]
 """
+ECHOED = "".join(f"header: {{seq: {i}}}\n{ROS_MESSAGE}---\n" for i in range(3))
+OPENCV_JS = json.dumps(
+    {
+        "imageSize": {"width": 2448, "height": 2048},
+        "cameraMatrix": dict(
+            enumerate([4638.2, 0, 1219.6, 0, 4637.1, 1031.3, 0, 0, 1])
+        ),
+        "distCoeffs": dict(enumerate(DISTORTION.tolist())),
+    }
+)
 KALIBR = """cam0:
   cam_overlaps: []
   camera_model: pinhole
@@ -137,10 +147,15 @@ def read_by_opencv(path: Path) -> cv2.FileStorage:
 
 
 @pytest.mark.parametrize(
-    "text", [OPENCV, ROS, ROS_MESSAGE], ids=["OpenCV", "ROS file", "ROS message"]
+    "text", [OPENCV, OPENCV_JS, ROS, ROS_MESSAGE, ECHOED], ids=list("12345")
 )
 def test_layouts_with_a_camera_matrix_are_read(tmp_path: Path, text: str) -> None:
     assert_same(read_camera(saved(tmp_path, text)), camera())
+
+
+def test_messages_of_two_cameras_are_not_one(tmp_path: Path) -> None:
+    text = f"{ROS_MESSAGE}---\n{ROS_MESSAGE.replace('1219', '1218')}"
+    assert "more than one YAML document" in refusal(tmp_path, text)
 
 
 def test_a_chain_of_kalibr_is_read(tmp_path: Path) -> None:

@@ -356,10 +356,20 @@ def test_a_document_of_points_alone_is_a_list(tree: object, tmp_path: Path) -> N
     np.testing.assert_array_equal(read_pen(path, units="mm").leds, LEDS)
 
 
-def test_the_first_column_names_the_points_whatever_its_title(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("Merkmal;x_mm;y_mm;z_mm", "Kreis_{}"),
+        ("// Sammlung;Gruppe;Punkt;x_mm;y_mm;z_mm", "A;LEDs;LED{}"),
+        ("Stift 3;Datum;1.5.;HK\nMerkmal;x;y;z\n-;mm;mm;mm", "Kreis_{}"),
+    ],
+)
+def test_the_first_column_of_names_tells_the_points_whatever_its_title(
+    tmp_path: Path, head: str, names: str
+) -> None:
     path = tmp_path / "bericht.csv"
-    rows = [f"Kreis_{i};{x};{y};{z}\n" for i, (x, y, z) in enumerate(LEDS, 1)]
-    path.write_text("Merkmal;x_mm;y_mm;z_mm\n" + "".join(rows))
+    rows = [f"{names.format(i)};{x};{y};{z}\n" for i, (x, y, z) in enumerate(LEDS, 1)]
+    path.write_text(head + "\n" + "".join(rows))
 
     np.testing.assert_array_equal(read_pen(path).leds, LEDS)
 

@@ -127,6 +127,7 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         ('{"CameraParameters1": {}, "CameraParameters2": {}}', "a stereo pair"),
         ('<Cameras><Camera DEVICEID="1"/><Camera DEVICEID="2"/></Cameras>', "Vicon"),
         ('{"cameras": [{"name": "left", "K": [[1]]}]}', "another program"),
+        ('{"cameras": {"left": {"K": [[1]]}}, "camera_poses": {}}', "another program"),
         ("image_width: 9\n", "another program"),
     ],
 )
@@ -137,6 +138,12 @@ def test_a_rig_of_another_program_is_named(
     path.write_text(text)
 
     assert re.search(f"of {program}.* see Help, Rig files", refusal(path))
+
+
+def test_a_misspelt_rig_file_is_not_of_another_program(rig_file: Path) -> None:
+    rig_file.write_text(rig_file.read_text().replace('"cameras"', '"camera"'))
+
+    assert "has the unknown key" in refusal(rig_file)
 
 
 @pytest.mark.parametrize(

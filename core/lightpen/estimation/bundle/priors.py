@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
 from lightpen.model.coverage import normal_quantile
 from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import Assumptions
@@ -172,9 +172,9 @@ def prior_of_camera(camera: Camera, assumptions: Assumptions) -> Prior:
         return Prior(camera.covariance, assumed=False)
     variances = np.zeros(len(camera.intrinsics))
     variances[2:4] = assumptions.principal_point**2
-    tangential = assumptions.tangential
-    distortion = [assumptions.k1, assumptions.k2, tangential, tangential, 0.0]
-    variances[4:9] = np.square(distortion)
+    variances[4:6] = assumptions.k1**2, assumptions.k2**2
+    if camera.lens is LensModel.BROWN:
+        variances[6:8] = assumptions.tangential**2
     covariance = np.diag(variances)
     focal = np.array([camera.fx, camera.fy])
     # fx and fy share what the focal length is off by; their ratio is known far better.
