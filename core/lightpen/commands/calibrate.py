@@ -51,8 +51,6 @@ from lightpen.record.swings.reading import (
 )
 from lightpen.record.swings.solving import record_inputs, solve_again, solve_record
 
-RIG_NEEDED = message("cli.rig-needed")
-
 
 def add_calibrate(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen calibrate``."""
@@ -259,7 +257,9 @@ def _observe(
 ) -> tuple[Sequence[Observations], tuple[Path, ...]]:
     """Return the observations of each camera, and the files of images or centres."""
     places: Sequence[str | Path] = options.centers or options.images
-    needed = RIG_NEEDED
+    needed = message("cli.rig-needed")
+    if options.centers is not None:
+        needed = message("cli.one-table")
     if options.rig is not None:
         names = ", ".join(rig.names)
         needed = message("cli.one-of-each-camera", n_cameras=rig.n_cameras, names=names)

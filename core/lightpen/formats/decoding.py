@@ -163,18 +163,23 @@ def _read(stream: BinaryIO, name: str, place: PagePlace | None) -> Image:
     if is_tiff(start):
         page = read_page(stream, name, place)
         with _MEMORY.given(_needed(page.header, 2 * page.n_bytes, name)):
-            return _page(stream, page, name)
+            return _in_order(_page(stream, page, name), name)
     stream.seek(0)
     header = read_image_header(stream, name)
     size = stream.seek(0, os.SEEK_END)
     with _MEMORY.given(_needed(header, size, name)):
         stream.seek(0)
         image = grey_image(_decoded(stream.read(size), name), name)
+    return _in_order(image, name, header.full_scale)
+
+
+def _in_order(image: Image, name: str, full_scale: int | None = None) -> Image:
+    """Return an image; refuse one whose values have their two bytes exchanged."""
     if image.dtype == np.uint16:
         most, low = int(image.max(initial=0)), int((image & 255).max(initial=0))
         # Of 14 bits or fewer, a high byte that stands in the place of the low is small.
         is_small = 0 < low < 64 and most >= 1 << 14 and np.unique(image).size > 64
-        if is_small or most > (header.full_scale or most):
+        if is_small or most > (full_scale or most):
             raise FileError("image.exchanged-bytes", name=name)
     return image
 

@@ -101,10 +101,14 @@ def opened(path: Path, what: Message, limit: int) -> Iterator[BinaryIO]:
 def read_text(path: Path, what: Message, limit: int) -> str:
     r"""Return a text file as `read_bytes`, with ``\n`` at the line ends.
 
-    UTF-8 with or without byte order mark, UTF-16 with one, and GB 18030 or
-    Windows-1252, which old instruments write in comments.
+    UTF-8 with or without byte order mark, UTF-16 with one, and GB 18030,
+    Windows-1252 or Shift JIS, which old instruments write in comments.
     """
-    data = read_bytes(path, what, limit)
+    return text_of(read_bytes(path, what, limit), path, what)
+
+
+def text_of(data: bytes, path: Path, what: Message) -> str:
+    """Return the text of a file of this content; see `read_text`."""
     if kind := kind_of(data):
         raise FileError("read.kind", what=what, path=path, kind=kind)
     try:
@@ -308,7 +312,10 @@ def _decode(data: bytes) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode("gb18030" if re.search(_CHINESE, data) else "cp1252")
+        usual = "gb18030" if re.search(_CHINESE, data) else "cp1252"
+    with contextlib.suppress(UnicodeDecodeError):
+        return data.decode(usual)
+    return data.decode("cp932")
 
 
 def _replace(target: Path, data: bytes) -> None:

@@ -94,6 +94,8 @@ def _is_pattern(levels: FloatArray) -> bool:
 
 MAX_PARTS = 30_000  # segments or chunks before the tag
 LARGEST_EXIF = 2**16  # bytes
+MOST_CAMERAS = 8
+SHARED = 0.5  # of the numbers of images, that those of several cameras share
 
 _EXIF = b"Exif\0\0"
 _MEANINGS = {
@@ -121,6 +123,31 @@ def orientation_remark(files: tuple[Path, ...]) -> Message | None:
         tag=tag,
         meaning=_MEANINGS[tag],
     )
+
+
+def cameras_remark(files: Sequence[Path]) -> Message | None:
+    """Return a remark on files that seem to be of several cameras, by their names."""
+    for number in (r"(?a)\d+(?=\D*$)", r"(?a)\d+"):  # the last, or the first
+        series: dict[str, dict[int, str]] = {}
+        for file in files:
+            if found := re.search(number, file.stem):
+                others = file.stem[: found.start()] + file.stem[found.end() :]
+                series.setdefault(others, {})[int(found[0])] = file.name
+        each = sorted(series.values(), key=len)
+        if not 1 < len(each) <= MOST_CAMERAS:
+            continue
+        n_shared = len(set.intersection(*map(set, each)))
+        # Milliseconds at the end of names are no numbers of images.
+        span = max(each[-1]) - min(each[-1])
+        if n_shared > max(SHARED * len(each[-1]), 2) and span < 2 * len(each[-1]):
+            first, second = (each[i][min(each[i])] for i in (0, 1))
+            return message(
+                "images.several-cameras",
+                n_series=len(each),
+                first=printable(min(first, second)),
+                second=printable(max(first, second)),
+            )
+    return None
 
 
 def read_orientation(path: Path) -> int:
@@ -358,7 +385,7 @@ def image_files(files: list[Path]) -> ImageSource:
         tuple(files),
         loaders,
         _stated_full_scale(files),
-        partial(orientation_remark, tuple(files)),
+        lambda: cameras_remark(files) or orientation_remark(tuple(files)),
     )
 
 

@@ -14,6 +14,7 @@ Without a header the columns stand in this order, with the number first if there
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
@@ -21,7 +22,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import HEAD, MEGABYTE, foreign_program, quoted, read_bytes
+from lightpen.formats.files import HEAD, MEGABYTE, foreign_program, quoted
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_columns import STATE, is_lost
 from lightpen.formats.pose_files import (
@@ -34,14 +35,7 @@ from lightpen.formats.pose_files import (
     read_sequence,
     refuse_foreign_poses,
 )
-from lightpen.formats.tables import (
-    NOTHING,
-    Table,
-    is_workbook,
-    parse_table,
-    read_table,
-    table_text,
-)
+from lightpen.formats.tables import NOTHING, Table, parse_table, table_text
 from lightpen.messages import Message, message, printable
 from lightpen.model.rigid import nearest_rotation
 
@@ -56,21 +50,42 @@ LARGEST_TRANSLATION = 1e6  # mm
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
 
+# Names of columns, the best first, without regard to blanks and punctuation.
+_NUMBER = ("", "id", "no", "nr", "num", "number", "idx", "index", "nummer", "name")
+_TIMES = ("s", "ms", "us", "ns")
+_POINTS = ("marker", "point", "target", "spot", "blob", "dot", "keypoint", "feature")
+_PLACES = (
+    *("position", "pos", "center", "centre", "centroid", "coord", "coordinate"),
+    *("koordinate", "image", "img"),
+)
 _FRAME = (
-    *("frame", "frame_id", "frame_number", "frame_no", "frame_nr", "frame_index"),
-    *("frame_idx", "image", "image_id", "img", "image_name", "filename", "time"),
-    *("timestamp", "timestamp_ns", "timestamp_ms", "time_s", "time_ms", "t"),
+    *(f"frame{end}" for end in _NUMBER),
+    *(f"{word}{end}" for word in ("image", "img", "picture") for end in _NUMBER),
+    *("filename", "file", "image_file", "path", "slice", "shot", "bild", "bild_nr"),
+    *("bildnummer", "帧", "帧号", "帧序号", "图像", "图像编号", "图片", "フレーム"),
+    *("フレーム番号", "time", "timestamp", "stamp", "datetime", "zeit", "时间", "t"),
+    *(f"{word}_{unit}" for word in ("time", "timestamp") for unit in _TIMES),
 )
 _LED = (
-    *("led", "led_id", "led_no", "marker", "marker_id", "point", "point_id"),
-    *("point_index", "target", "track_id", "particle", "name", "id"),
+    *(f"led{end}" for end in (*_NUMBER, "编号", "号", "番号")),
+    *(f"{word}{end}" for word in _POINTS for end in _NUMBER),
+    *("track_id", "particle", "灯", "灯号", "标记点", "点号", "label", "name", "id"),
 )
-_PIXEL = (
-    ("x_px", "x", "u_px", "u", "position_x", "center_x", "cx", "column", "col"),
-    ("y_px", "y", "v_px", "v", "position_y", "center_y", "cy", "row"),
+_PIXEL = tuple(
+    (
+        *(f"{axis}_px", axis, f"{other}_px", other, f"{axis}_pixel", f"pixel_{axis}"),
+        *(f"{word}_{axis}" for word in _PLACES),
+        *(f"{axis}_{word}" for word in _PLACES),
+        *(f"c{axis}", f"{axis}c", f"p{axis}", f"{axis}坐标", f"{axis}座標", *further),
+    )
+    for axis, other, *further in (
+        ("x", "u", "column", "col", "centroid_1"),  # as of MATLAB and scikit-image
+        ("y", "v", "row", "centroid_0", "centroid_2"),
+    )
 )
-_OF_LED = r"(?:led|marker|point|pt|p|m)?[ _.:-]*(\d+)"  # in a column's name
-_WIDE = rf"(?a)(?:{_OF_LED}[ _.:-]*([xy])|([xy])[ _.:-]*{_OF_LED})(_px| *[\[(].*)?"
+_APART = r"[ _.:/-]*"
+_OF_LED = rf"(?:led|marker|point|pt|p|m)?{_APART}(\d+)"  # in a column's name
+_WIDE = rf"(?a)(?:{_OF_LED}{_APART}([xy])|([xy]){_APART}{_OF_LED})(_px| *[\[(].*)?"
 _LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"
 _CENTERS = (_FRAME, _LED, *_PIXEL)
 _UNLABELLED = (_FRAME, *_PIXEL)
@@ -120,6 +135,8 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     table = _long(_table_of_centers(path))
     columns = table.columns(_CENTERS, message("table.of-centers"))
     table = _numbered(_with_leds(table, columns), columns[1])
+    for above, row in pairwise(table.rows):  # of merged cells
+        row[columns[0]] = row[columns[0]] or above[columns[0]]
     frame_of_row = table.moments(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = _seen_pixels(table, columns[2:])
@@ -143,15 +160,17 @@ def read_centers(path: Path, n_leds: int) -> Centers:
 
 def _table_of_centers(path: Path) -> Table:
     """Read a table without lines of units; refuse the file of a program by its name."""
-    what, name = message("file.centers"), printable(path.name)
-    data = read_bytes(path, what, OBSERVATION_FILE_LIMIT)
-    program = foreign_program(data[:HEAD], "centers")[0]
-    if program and not is_workbook(data):
-        raise FileError("centers.foreign", name=name, program=program)
-    table = read_table(path, what, OBSERVATION_FILE_LIMIT)
+    what = message("file.centers")
+    text = table_text(path, what, OBSERVATION_FILE_LIMIT, _refuse_foreign)
+    table = parse_table(text, printable(path.name))
     is_text = [not re.search(r"\d", "".join(row)) for row in table.rows]
     first = is_text.index(False) if False in is_text else 0
     return table.only(range(first, len(table.rows)))
+
+
+def _refuse_foreign(data: bytes, name: str) -> None:
+    if program := foreign_program(data[:HEAD], "centers")[0]:
+        raise FileError("centers.foreign", name=name, program=program)
 
 
 def _long(table: Table) -> Table:
@@ -244,10 +263,8 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
         given = read_sequence(path, tool)
         return _foreign_poses(given, path)
     name = printable(path.name)
-    data = read_bytes(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
-    if not is_workbook(data):
-        refuse_foreign_poses(data[:HEAD], name)
-    text = table_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
+    what = message("file.poses")
+    text = table_text(path, what, OBSERVATION_FILE_LIMIT, refuse_foreign_poses)
     text = motive_table(text, name) if is_motive(text) else text
     if is_own(parse_table(text, name, is_foreign=True)):
         return _own_poses(parse_table(text, name), path)

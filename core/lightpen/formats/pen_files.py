@@ -52,7 +52,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree, parse_json, parse_yaml
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import MEGABYTE, quoted, read_bytes, write_whole
+from lightpen.formats.files import MEGABYTE, quoted, write_whole
 from lightpen.formats.pen_tables import (
     LARGEST_DIAMETER,
     LENGTHS,
@@ -343,9 +343,8 @@ def _read(path: Path, units: str | None) -> PenContent:
         raise UsageError(
             "pen-file.unknown-unit", unit=quoted(units), known=", ".join(UNITS)
         )
-    data, name = read_bytes(path, PEN_FILE, PEN_FILE_LIMIT), printable(path.name)
-    refuse_foreign_list(data, name)
-    text = table_text(path, PEN_FILE, PEN_FILE_LIMIT)
+    text = table_text(path, PEN_FILE, PEN_FILE_LIMIT, refuse_foreign_list)
+    name = printable(path.name)
     if path.suffix.lower() in (".yaml", ".yml"):
         return _of_document(parse_yaml(text, name), units, name)
     if text.lstrip().startswith(("{", "[")):

@@ -12,7 +12,7 @@ from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
 from lightpen.formats.files import foreign_program, quoted
-from lightpen.formats.tables import Table, is_workbook, number_flaw
+from lightpen.formats.tables import Table, number_flaw
 from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import FoundPen
@@ -326,8 +326,7 @@ def refuse_foreign_list(data: bytes, name: str) -> None:
     """Refuse the file of a program whose points cannot be read, by name."""
     if data.startswith(_ROM):
         raise FileError("pen-file.rom", name=name)
-    start = b"" if is_workbook(data) else data
-    if program := foreign_program(start, "pens")[0]:
+    if program := foreign_program(data, "pens")[0]:
         raise FileError("pen-file.foreign", name=name, program=program)
 
 

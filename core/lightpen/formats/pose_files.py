@@ -17,7 +17,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import foreign_program, opened
+from lightpen.formats.files import HEAD, foreign_program, opened
 from lightpen.formats.pen_tables import without_units
 from lightpen.formats.pose_columns import (
     STATE,
@@ -56,9 +56,9 @@ class GivenPoses:
     remarks: tuple[Message, ...]
 
 
-def refuse_foreign_poses(head: bytes, name: str) -> None:
+def refuse_foreign_poses(data: bytes, name: str) -> None:
     """Refuse poses in a form that is not read, by its name."""
-    if program := foreign_program(head, "poses")[0]:
+    if program := foreign_program(data[:HEAD], "poses")[0]:
         raise FileError("poses.foreign", name=name, program=program)
 
 

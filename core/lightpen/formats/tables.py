@@ -5,7 +5,7 @@ import io
 import math
 import re
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import compress, takewhile
@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import quoted, read_bytes, read_text
+from lightpen.formats.files import quoted, read_bytes, text_of
 from lightpen.messages import Message, message, printable
 
 MAX_LINES = 300_000  # 0.2 GB while they are read
@@ -191,25 +191,22 @@ class Table:
         )
 
 
-def read_table(path: Path, what: Message, limit: int) -> Table:
-    """Read a table from delimited text of at most ``limit`` bytes.
+def table_text(
+    path: Path, what: Message, limit: int, refuse: Callable[[bytes, str], None]
+) -> str:
+    """Return the text of a table; of a workbook, its first sheet with one.
 
-    The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
-    have decimal commas unless the comma separates columns. Blank lines and lines that
-    begin with ``#`` or ``//`` are skipped. A first line without numbers is a header.
+    ``refuse`` takes the content and the name of any other file, and raises `FileError`
+    if it is of another program.
     """
-    return parse_table(table_text(path, what, limit), printable(path.name))
+    data, name = read_bytes(path, what, limit), printable(path.name)
+    if _is_workbook(data):
+        return _workbook_text(data, name)
+    refuse(data, name)
+    return text_of(data, path, what)
 
 
-def table_text(path: Path, what: Message, limit: int) -> str:
-    """Return the text of a table; of a workbook, its first sheet with one."""
-    data = read_bytes(path, what, limit)
-    if is_workbook(data):
-        return _workbook_text(data, printable(path.name))
-    return read_text(path, what, limit)
-
-
-def is_workbook(data: bytes) -> bool:
+def _is_workbook(data: bytes) -> bool:
     """Return whether the content of a file is that of a workbook: xlsx, ods or xls."""
     parts = (b"xl/workbook", b"content.xml")
     is_packed = data.startswith(b"PK\x03\x04") and any(each in data for each in parts)
@@ -246,8 +243,11 @@ def _cell(value: object) -> str:
 
 
 def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
-    r"""Read a table from a text with ``\n`` at the line ends; see `read_table`.
+    r"""Read a table from a text with ``\n`` at the line ends.
 
+    The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
+    have decimal commas unless the comma separates columns. Blank lines and lines that
+    begin with ``#`` or ``//`` are skipped. A first line without numbers is a header.
     A foreign table may have columns of the same name, short lines, and its header in a
     comment.
     """
@@ -298,8 +298,8 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
 
 
 def _plain(name: str) -> str:
-    """Return the name of a column without unit and blanks."""
-    return re.sub(_IN_BRACKETS, "", name).replace(" ", "_")
+    """Return the letters and digits of the name of a column, without unit."""
+    return re.sub(r"[\W_]", "", re.sub(_IN_BRACKETS, "", name)) or name
 
 
 def _n_titles(rows: list[list[str]]) -> int:

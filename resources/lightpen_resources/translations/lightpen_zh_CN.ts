@@ -5108,6 +5108,10 @@
         <translation>LED {led} 不在 LED 文件所示的位置</translation>
     </message>
     <message>
+        <source>LED {led} of frame {frame} is already given on line {line}. Keep the right one; of several cameras, write a file each.</source>
+        <translation>第 {frame} 帧的 LED {led} 已在第 {line} 行给出。请保留正确的一个；若有多台相机，请每台写一个文件。</translation>
+    </message>
+    <message>
         <source>LED {led} of {name}</source>
         <translation>{name} 的 LED {led}</translation>
     </message>
@@ -5588,6 +5592,10 @@
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
     <message>
+        <source>The numbers in the names repeat in {n_series} series, as in {first} and {second}. If they are images of several cameras, put those of each into a folder of its own: together they look like a pen that slips or a cone that moves.</source>
+        <translation>文件名中的编号在 {n_series} 个系列中重复，例如 {first} 和 {second}。如果图像来自多台相机，请将每台的图像放入各自的文件夹：混在一起看起来像测尖打滑或锥孔移动。</translation>
+    </message>
+    <message>
         <source>The path of the video {path} is no valid UTF-8, which the video decoder needs. Rename the video or its folder, or copy it elsewhere.</source>
         <translation>视频路径 {path} 不是有效的 UTF-8，视频解码器无法使用。请重命名视频或其文件夹，或将其复制到别处。</translation>
     </message>
@@ -5654,6 +5662,10 @@
     <message>
         <source>The translations are about {typical:.3g} long: they are taken as metres.</source>
         <translation>平移量约为 {typical:.3g}：按米处理。</translation>
+    </message>
+    <message>
+        <source>The two bytes of each value in {name} are probably exchanged, by its levels. Save the images with the bytes in the order that their format states.</source>
+        <translation>从灰度值看，{name} 中每个值的两个字节可能颠倒了。请按图像格式规定的字节顺序保存图像。</translation>
     </message>
     <message>
         <source>The {kind} {name} does not show the normal of its surface, along which the ball is compensated. In the plan name the plane it lies on (&apos;surface: NAME&apos;), give the normal out of the material (&apos;normal: [x, y, z]&apos; in the part&apos;s frame), probe that plane too, or state &apos;side: centre&apos; for the ball centre itself.</source>
@@ -5900,10 +5912,6 @@
         <translation>图像左右镜像</translation>
     </message>
     <message>
-        <source>the images are mirrored top to bottom</source>
-        <translation>图像上下镜像</translation>
-    </message>
-    <message>
         <source>the intrinsics file is for images binned by 2</source>
         <translation>内参文件属于按 2 合并像素的图像</translation>
     </message>
@@ -6062,10 +6070,6 @@
     <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
-    </message>
-    <message>
-        <source>The two bytes of each value in {name} are probably exchanged, by its levels. Save the images with the high byte first.</source>
-        <translation>从灰度值看，{name} 中每个值的两个字节可能颠倒了。请以高字节在前保存图像。</translation>
     </message>
     <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
@@ -6480,6 +6484,10 @@
         <translation>球（直径）</translation>
     </message>
     <message>
+        <source>the images are mirrored top to bottom (in LED centres, y counts upwards)</source>
+        <translation>图像上下镜像（对于 LED 中心：y 向上计数）</translation>
+    </message>
+    <message>
         <source>the lens, beyond its distortion model, and the systematic error of the LED centres. Calibrate the camera with views that fill the image, so that its file states the lens field, focus the lens, and illuminate the LEDs evenly</source>
         <translation>镜头超出畸变模型的部分以及 LED 中心的系统误差。请以布满图像的视图标定相机，使其文件给出镜头残余场；对焦镜头，并使 LED 发光均匀</translation>
     </message>
@@ -6708,6 +6716,10 @@
         <translation>{name} 是含 {n_scans} 次扫描的 JPEG；最多读取 {most} 次。请将图像保存为 PNG。</translation>
     </message>
     <message>
+        <source>{name} is a file of the kind {kind}, from which no images are read. Save its images as files of PNG or TIFF in one folder.</source>
+        <translation>{name} 是 {kind} 类型的文件，无法从中读取图像。请将其中的图像另存为同一文件夹中的 PNG 或 TIFF 文件。</translation>
+    </message>
+    <message>
         <source>{name} is an animation. Save its images one by one.</source>
         <translation>{name} 是动画。请将其中的图像逐幅保存。</translation>
     </message>
@@ -6934,10 +6946,6 @@
     <message>
         <source>LED {led} moved by {distance:.3f} mm relative to the others according to {swing}: it was knocked or is loose.</source>
         <translation>据 {swing}，LED {led} 相对其他 LED 移动了 {distance:.3f} mm：它被碰弯、碰撞或松动。</translation>
-    </message>
-    <message>
-        <source>LED {led} of frame {frame} is already given on line {line}. Keep the right one.</source>
-        <translation>第 {frame} 帧的 LED {led} 已在第 {line} 行给出。请保留正确的一个。</translation>
     </message>
     <message>
         <source>LED {led} was not detected in any image. It is covered, off, or its position in the LED file is wrong.</source>
@@ -8258,10 +8266,6 @@
     <message>
         <source>{name} is JSON, where a table is read. Write it as CSV, with a header and a line for each row.</source>
         <translation>{name} 是 JSON，而此处读取的是表格。请写成 CSV，带表头，每行一条。</translation>
-    </message>
-    <message>
-        <source>{name} is a file of the kind {kind}, from which no images are read. Save the images as PNG or TIFF.</source>
-        <translation>{name} 是 {kind} 类型的文件，无法从中读取图像。请将图像保存为 PNG 或 TIFF。</translation>
     </message>
     <message>
         <source>{name} is no workbook with a sheet that can be read. Save the sheet with the table as CSV.</source>

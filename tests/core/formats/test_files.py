@@ -138,7 +138,7 @@ def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
         (b"ARROW1\0\0", "a file of the kind Arrow"),
         (b"ISO-10303-21;\nHEADER;", "a file of the kind STEP"),
         (b"\xef\xbb\xbf<!DOCTYPE html>\n<html>", "HTML"),
-        (b"\x81\x8d", "byte 1 matches no known encoding"),
+        (b"\x81\x20", "byte 1 matches no known encoding"),
         (b"\xff\xfe1", "matches no known encoding."),
         (b" \n\t\n", "contains only blanks."),
         (b"\xef\xbb\xbf", "contains only blanks."),

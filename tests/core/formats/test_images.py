@@ -20,7 +20,7 @@ from lightpen.formats.decoding import (
     full_scale_of,
     read_image,
 )
-from lightpen.formats.images import find_images, is_mosaic, look_at_all
+from lightpen.formats.images import cameras_remark, find_images, is_mosaic, look_at_all
 from lightpen.formats.video_process import (
     count_frames_in_process,
     frame_loaders_in_process,
@@ -563,3 +563,28 @@ def test_a_folder_of_files_of_another_kind_names_it(
 
     with pytest.raises(FileError, match=rf"{name} is of the kind {kind}.*a video"):
         find_images(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("names", "is_named"),
+    [
+        (("cam0_{:04d}", "cam1_{:04d}"), True),
+        (("Basler_23057032_{}", "Basler_23057033_{}"), True),
+        (("{:04d}_left", "{:04d}_right"), True),
+        (("{:04d}_cam1", "{:04d}_cam2", "{:04d}_cam3"), True),
+        (("frame_{:04d}",), False),
+        (("first_{}", "second_1{}"), False),
+        (("10-15-22_{}50", "10-15-23_{}50"), False),
+        (("image (1)", "image (2)"), False),
+    ],
+)
+def test_images_of_several_cameras_are_named_as_the_cause(
+    names: tuple[str, ...], is_named: bool
+) -> None:
+    numbers = range(10)
+    files = [Path(f"{name.format(i)}.png") for i in numbers for name in names]
+    remark = cameras_remark(files)
+    assert (remark is not None) == is_named
+    if remark is not None:
+        assert f"in {len(names)} series" in str(remark)
+        assert files[0].name in str(remark)

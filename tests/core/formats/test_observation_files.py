@@ -72,6 +72,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         (HEADER + ",x1,y1,x2,y2", "7,1,1.5,2.5,0,0,0,0", "2,1,3,4,,,,", "7,3,5,6,,,,"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
         ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
+        ("t;LED 1/X;LED 1/Y;LED 3/X;LED 3/Y", "7;1.5;2.5;5;6", "2;3;4;;"),
         ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
         ("frame_index,particle,y,x", "7,1,2.5,1.5", "2,1,4,3", "7,3,6,5"),
         ("frame,led,x,y", "[-],[-],[px],[px]", "7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
@@ -86,6 +87,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             "of each LED, too",
             "a line for a frame",
             "names in front",
+            "of Kinovea",
             "with units",
             "of trackpy",
             "units",
@@ -106,6 +108,41 @@ def test_centres_are_sorted_by_frame_and_led(
         found.pixels, [[[3, 4], nan, nan], [[1.5, 2.5], nan, [5, 6]]]
     )
     assert found.path == path
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        *(
+            "Bild;LED-Nr.;X [Pixel];Y [Pixel]",
+            "stamp;led_id;u;v",
+            "帧号;灯号;X坐标;Y坐标",
+        ),
+        *("frameNumber;Marker #;X-Koordinate;Y-Koordinate", "img;dot;row;column"),
+        *("Slice;label;centroid-1;centroid-0", "image_file;keypoint;x_img;y_img"),
+    ],
+)
+def test_columns_have_the_names_that_people_write(tmp_path: Path, header: str) -> None:
+    columns = header.split(";")
+    line = "7;LED2;2.5;1.5" if columns[2] == "row" else "7;LED2;1.5;2.5"
+    found = read_centers(saved(tmp_path, header, line), 2)
+    assert found.frames.tolist() == [7]
+    assert found.pixels[0, 1].tolist() == [1.5, 2.5]
+
+
+def test_a_frame_without_number_is_that_of_the_line_above(tmp_path: Path) -> None:
+    """A spreadsheet names it in the first cell of those that were merged."""
+    rows = ("1;1;10;20", ";2;30;40", "2;1;11;21", ";2;31;41")
+    found = read_centers(saved(tmp_path, "frame;led;x;y", *rows), 2)
+    assert found.frames.tolist() == [1, 2]
+    assert found.pixels[:, 1].tolist() == [[30, 40], [31, 41]]
+
+
+def test_names_of_columns_may_be_in_shift_jis(tmp_path: Path) -> None:
+    path = tmp_path / "centres.csv"
+    text = "フレーム,LED番号,X座標,Y座標\n3,1,1.5,2.5\n"
+    path.write_bytes(text.encode("shift_jis"))
+    assert read_centers(path, 1).pixels.tolist() == [[[1.5, 2.5]]]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import PEN_FILE
-from lightpen.formats.tables import Table, number_flaw, parse_table, read_table
+from lightpen.formats.tables import Table, number_flaw, parse_table, table_text
 from lightpen.messages import message
 
 LEDS = message("table.of-leds")
@@ -72,8 +72,10 @@ def test_every_layout_gives_the_same_numbers(text: str) -> None:
 def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "leds.csv"
     path.write_bytes(b"\xef\xbb\xbfled,x_mm,y_mm\r\n1,0.5,-2.25\r\n")
-    table = read_table(path, PEN_FILE, 1000)
-    assert (table.name, table.lines) == ("leds.csv", [2])
+    asked = []
+    text = table_text(path, PEN_FILE, 1000, lambda data, name: asked.append(name))
+    table = parse_table(text, "leds.csv")
+    assert (asked, table.lines) == (["leds.csv"], [2])
     assert numbers(table) == NUMBERS[:1]
 
 

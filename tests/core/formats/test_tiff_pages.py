@@ -202,6 +202,13 @@ def test_colours_may_be_in_planes() -> None:
     np.testing.assert_array_equal(decoded, cv2.cvtColor(COLOUR, cv2.COLOR_RGB2GRAY))
 
 
+def test_values_with_exchanged_bytes_are_named() -> None:
+    deep = np.right_shift(DEEP, 4, dtype=np.uint16)
+    assert np.array_equal(decode_image(tiff(page(deep)), "a.tif"), deep)
+    with pytest.raises(FileError, match="bytes of each value"):
+        decode_image(tiff(page(deep.byteswap())), "a.tif")
+
+
 def test_packed_values_of_12_bits_keep_their_scale() -> None:
     values = (DEEP >> 4)[:, :66]
     first, second = values[:, ::2].astype(np.uint32), values[:, 1::2].astype(np.uint32)
