@@ -290,6 +290,7 @@ LEAST_PART = 0.1  # of the poses, before a step and after it
 SINGULAR = 1e-12  # of the trace; parts of too similar poses give any finite answer
 STEP = 60.0  # chi-square, 6 degrees of freedom: its place was chosen by residuals
 MANY_LEFT_OUT = 0.1  # of the poses
+STRETCH = 5  # neighbouring poses, which noise alone does not leave out
 MOST_LEFT_OUT = 0.4  # of the poses; with more the tip is ambiguous
 MAX_RUNS = 10  # of neighbouring poses, that a warning names; the record has all
 
@@ -398,13 +399,18 @@ def _require_no_step(
 
 def _names(chosen: BoolArray, max_runs: int, places: IntArray) -> str:
     """Return the chosen poses (N,) as text, by their place in the file from 1."""
-    indices = np.flatnonzero(chosen)
-    runs = np.split(places[indices], np.flatnonzero(np.diff(indices) > 1) + 1)
+    runs = [places[run] for run in _runs(chosen)]
     named = [
         f"{run[0]}" if len(run) == 1 else f"{run[0]}-{run[-1]}"
         for run in runs[:max_runs]
     ]
     return ", ".join(named) + (", ..." if len(runs) > max_runs else "")
+
+
+def _runs(chosen: BoolArray) -> list[IntArray]:
+    """Return the indices of the chosen poses (N,), neighbours together."""
+    indices = np.flatnonzero(chosen)
+    return np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
 
 
 def _covariance(
@@ -426,7 +432,8 @@ def _covariance(
 
 def _warnings(fit: PivotFit, places: IntArray) -> list[Message]:
     warnings, scattered = [], ~fit.used
-    if scattered.mean() > MANY_LEFT_OUT:
+    longest = max(map(len, _runs(scattered)))
+    if scattered.mean() > MANY_LEFT_OUT or longest >= STRETCH:
         warnings.append(
             message(
                 "pivot.many-left-out",

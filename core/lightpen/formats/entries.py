@@ -1,5 +1,6 @@
 """Look up numbers and texts by name in a parsed file."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,7 +189,7 @@ def _cells(value: Tree) -> list[Tree]:
     if isinstance(value, list):
         return [cell for item in value for cell in _cells(item)]
     if isinstance(value, str):
-        return list(value.split())
+        return list(re.sub(r"(?<=\d) ?x ?(?=\d)", " ", value).split())  # 640x480
     return [value]
 
 

@@ -33,7 +33,7 @@ _UNIT = (
     rf"(?:(?:[\s_./]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
-_ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
+_ROTATING = {"r", "q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
 _ROTATING |= {"四元数", "旋转", "姿态", "o"}  # ox to ow of ZED
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
 _MOVING |= {"平移", "位置", "坐标"}
@@ -116,11 +116,21 @@ def is_lost(state: str, column: str = "") -> bool:
 
 def _roles(header: Sequence[str]) -> list[_Role | None]:
     """Return the roles of columns; beside ``pen_qx``, ``pen_x`` is a place."""
+    header = _with_axes(header)
     roles = [_role(name) for name in header]
     tools = {role.tool for role in roles if role is not None and role.kind != "t"}
     return [
         role or _role(name, tools) for name, role in zip(header, roles, strict=True)
     ]
+
+
+def _with_axes(header: Sequence[str]) -> list[str]:
+    """Return names with x, y, z for three that end in 0, 1, 2, or in 1, 2, 3."""
+    ends: dict[str, str] = {}
+    for name in header:
+        ends[name[:-1]] = ends.get(name[:-1], "") + name[-1:]
+    axes = {"012": str.maketrans("012", "xyz"), "123": str.maketrans("123", "xyz")}
+    return [n[:-1] + n[-1:].translate(axes.get(ends[n[:-1]], {})) for n in header]
 
 
 def _role(name: str, tools: Container[str] = ()) -> _Role | None:

@@ -37,6 +37,7 @@ NOTHING = frozenset(
 # No digit can match in two ways, so that mismatches are found without backtracking.
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
+_GROUPED = r"(?a)[+-]?\d{1,3}([.,' ]\d{3})+[.,]\d+"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
 _COMMENT = r"\s*(?:[#%]|//)"  # of MATLAB and C++, too
 # Full-width characters, minus signs that are not of ASCII, blanks within numbers.
@@ -309,7 +310,11 @@ def _n_titles(rows: list[list[str]]) -> int:
     n_titles = next(i for i, count in enumerate(filled) if 2 * count > usual)
     if any(map(_looks_numeric, rows[n_titles])) and rows[0] != [str(len(rows) - 1)]:
         return 0  # unless they count the lines below
-    words = takewhile(lambda row: not any(map(_looks_numeric, row)), rows[n_titles:])
+    words = list(
+        takewhile(lambda row: not any(map(_looks_numeric, row)), rows[n_titles:])
+    )
+    if n_titles + len(words) == len(rows):
+        return n_titles
     # The last with the most names: units, which are equal, may stand below them.
     n_names = [(len({*row} - {""}), i) for i, row in enumerate(words)]
     return n_titles + max(n_names, default=(0, 0))[1]
@@ -346,6 +351,8 @@ def number_flaw(text: str) -> Message | None:
         return message("number.missing")
     if re.fullmatch(_NOT_FINITE, text):
         return message("number.not-finite", cell=quoted(text))
+    if re.fullmatch(_GROUPED, text):
+        return message("number.grouped", cell=quoted(text))
     return message("number.none", cell=quoted(text))
 
 

@@ -5952,6 +5952,10 @@
         <translation>{address} 不是本机的地址。请给出本机在客户端网络中的地址；仅限本机时用 {loopback}。</translation>
     </message>
     <message>
+        <source>{cell} has separators of thousands; write it without them.</source>
+        <translation>{cell} 含有千位分隔符；请去掉后书写。</translation>
+    </message>
+    <message>
         <source>{cell} is no number of an LED. Number the LEDs in the order of the LED file, from 1.</source>
         <translation>{cell} 不是 LED 编号。请按 LED 文件中的顺序从 1 开始给 LED 编号。</translation>
     </message>

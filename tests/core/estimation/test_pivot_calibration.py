@@ -70,6 +70,15 @@ def test_a_minority_elsewhere_is_left_out_and_named() -> None:
     assert "50 of 200 poses are outliers and were excluded: 151-200." in str(warning)
 
 
+@pytest.mark.parametrize(("step", "named"), [(1, ["excluded: 101-107."]), (9, [])])
+def test_a_few_are_named_if_they_are_a_stretch(step: int, named: list[str]) -> None:
+    others = np.isin(np.arange(N_POSES), 100 + step * np.arange(7))
+    found = calibrate_pivot(*with_other_pivot(others))
+
+    assert np.array_equal(found.fit.used, ~others)
+    assert [str(each).split(" were ")[1][:18] for each in found.warnings] == named
+
+
 def test_all_poses_alike_are_taken_if_requested() -> None:
     others = np.arange(N_POSES) >= 100
     found = calibrate_pivot(*with_other_pivot(others), robust=False)

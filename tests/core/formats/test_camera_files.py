@@ -262,7 +262,7 @@ def test_other_spellings_mean_the_same(tmp_path: Path, name: str, other: str) ->
 
 def test_plain_numbers_in_rows_are_a_matrix(tmp_path: Path) -> None:
     text = (
-        "image_size: 2448 2048\nK: [[4638.2, 0, 1219.6], [0, 4637.1, 1031.3], "
+        "image_size: 2448x2048\nK: [[4638.2, 0, 1219.6], [0, 4637.1, 1031.3], "
         f"[0, 0, 1]]\ndist: {DISTORTION.tolist()}\n"
     )
     assert_same(read_camera(saved(tmp_path, text)), camera())

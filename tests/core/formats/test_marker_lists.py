@@ -395,6 +395,12 @@ def test_headers_in_other_languages_are_read(
     np.testing.assert_array_equal(read_pen(path).leds, LEDS)
 
 
+def test_a_table_of_words_is_refused_by_the_names_on_its_top(tmp_path: Path) -> None:
+    text = "Element;Axis;Actual\n" + "".join(f"LED {a};{a};3 mm\n" for a in "XYZ")
+
+    assert 'header is "element,axis,actual"' in refusal(tmp_path, text)
+
+
 @pytest.mark.parametrize("head", ["# x_mm y_mm z_mm", "//X Y Z\n10"])
 def test_the_head_of_a_point_cloud_is_no_row(tmp_path: Path, head: str) -> None:
     rows = [f"{x} {y} {z}\n" for x, y, z in LEDS]

@@ -88,8 +88,13 @@ def matrices_by_columns() -> list[str]:
     return [names, *rows(np.swapaxes(whole, 1, 2).reshape(N_POSES, 16))]
 
 
-def vectors() -> list[str]:
-    header = "frame\trvec_x\trvec_y\trvec_z\ttvec_x\ttvec_y\ttvec_z"
+def of_vive() -> list[str]:
+    header = "time\tx\ty\tz\tr_x\tr_y\tr_z\tr_w"
+    return [header, *rows(np.arange(N_POSES), MOVED, QUATERNIONS)]
+
+
+def vectors(axes: Sequence[str] = "xyz") -> list[str]:
+    header = "\t".join(["frame", *(f"{v}vec_{axis}" for v in "rt" for axis in axes)])
     return [header, *rows(np.arange(N_POSES), ROTATIONS.as_rotvec(), MOVED)]
 
 
@@ -111,8 +116,11 @@ def named_by_tool() -> list[str]:
             matrices,
             matrices_by_columns,
             vectors,
+            of_vive,
             named_by_tool,
         ),
+        lambda: vectors("012"),
+        lambda: vectors("123"),
         lambda: ndi(["OK"] * N_POSES),
     ],
 )

@@ -128,7 +128,8 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         ('<Cameras><Camera DEVICEID="1"/><Camera DEVICEID="2"/></Cameras>', "Vicon"),
         ('{"cameras": [{"name": "left", "K": [[1]]}]}', "another program"),
         ('{"cameras": {"left": {"K": [[1]]}}, "camera_poses": {}}', "another program"),
-        ("image_width: 9\n", "another program"),
+        ("---\nimage_width: 9\n", "a single camera"),
+        ('[{"ref_camera_id": 1, "cameras": []}]', "COLMAP"),
     ],
 )
 def test_a_rig_of_another_program_is_named(

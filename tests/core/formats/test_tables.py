@@ -171,7 +171,7 @@ def test_points_and_commas_are_not_mixed() -> None:
 
 
 def test_thousands_separators_are_refused() -> None:
-    assert '"1.234,5" is not a number' in refusal("led;x\n1;1.234,5\n")
+    assert '"1.234,5" has separators of thousands' in refusal("led;x\n1;1.234,5\n")
 
 
 def test_a_row_of_another_length_is_named() -> None:
