@@ -313,11 +313,12 @@ def _require_size(searched: list[_Searched], camera: Camera) -> None:
 
 def _require_inside(pixels: FloatArray, camera: Camera) -> None:
     points = pixels[np.isfinite(pixels[..., 0])]
-    far = points.max(axis=0, initial=0)
+    near, far = points.min(axis=0, initial=0), points.max(axis=0, initial=0)
     outside = np.any((points < -0.5) | (points > camera.image_size), axis=1)
     if 2 * outside.sum() > len(points):
         raise FileError(
             "centers.outside",
+            near=f"({near[0]:.0f}, {near[1]:.0f})",
             x=far[0],
             y=far[1],
             width=camera.width,

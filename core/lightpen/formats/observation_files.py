@@ -55,7 +55,7 @@ _NUMBER = ("", "id", "no", "nr", "num", "number", "idx", "index", "nummer", "nam
 _TIMES = ("s", "ms", "us", "ns")
 _POINTS = ("marker", "point", "target", "spot", "blob", "dot", "keypoint", "feature")
 _PLACES = (
-    *("position", "pos", "center", "centre", "centroid", "coord", "coordinate"),
+    *("center", "centre", "centroid", "position", "pos", "coord", "coordinate"),
     *("koordinate", "image", "img"),
 )
 _FRAME = (
@@ -63,7 +63,8 @@ _FRAME = (
     *(f"{word}{end}" for word in ("image", "img", "picture") for end in _NUMBER),
     *("filename", "file", "image_file", "path", "slice", "shot", "bild", "bild_nr"),
     *("bildnummer", "帧", "帧号", "帧序号", "图像", "图像编号", "图片", "フレーム"),
-    *("フレーム番号", "time", "timestamp", "stamp", "datetime", "zeit", "时间", "t"),
+    *("フレーム番号", "time", "timestamp", "stamp", "datetime", "zeit", "zeitstempel"),
+    *("时间", "x_value", "t"),  # of LabVIEW
     *(f"{word}_{unit}" for word in ("time", "timestamp") for unit in _TIMES),
 )
 _LED = (
@@ -73,18 +74,20 @@ _LED = (
 )
 _PIXEL = tuple(
     (
-        *(f"{axis}_px", axis, f"{other}_px", other, f"{axis}_pixel", f"pixel_{axis}"),
+        *(f"{axis}_px", f"c{axis}", f"{axis}c"),
         *(f"{word}_{axis}" for word in _PLACES),
         *(f"{axis}_{word}" for word in _PLACES),
-        *(f"c{axis}", f"{axis}c", f"p{axis}", f"{axis}坐标", f"{axis}座標", *further),
+        *(axis, f"{other}_px", other, f"{axis}_pixel", f"pixel_{axis}", f"p{axis}"),
+        *(f"{axis}坐标", f"{axis}座標", *further),
     )
     for axis, other, *further in (
         ("x", "u", "column", "col", "centroid_1"),  # as of MATLAB and scikit-image
         ("y", "v", "row", "centroid_0", "centroid_2"),
     )
 )
-_APART = r"[ _.:/-]*"
-_OF_LED = rf"(?:led|marker|point|pt|p|m)?{_APART}(\d+)"  # in a column's name
+_BOX = ("w", "width", "h", "height")
+_APART = r"[ _.:/#-]*"
+_OF_LED = rf"(?:led|{'|'.join(_POINTS)}|pt|p|m)?{_APART}(\d+)"  # in a column's name
 _WIDE = rf"(?a)(?:{_OF_LED}{_APART}([xy])|([xy]){_APART}{_OF_LED})(_px| *[\[(].*)?"
 _LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"
 _CENTERS = (_FRAME, _LED, *_PIXEL)
@@ -140,6 +143,9 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     frame_of_row = table.moments(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = _seen_pixels(table, columns[2:])
+    box = next((name for name in table.header if name in _BOX), None)
+    if box and np.nanmax(np.abs(pixels - np.round(pixels)), initial=0) == 0:
+        raise FileError("centers.boxes", name=table.name, column=box)
     _check_centers(table, led_of_row, pixels, n_leds)
     frames, place = np.unique(frame_of_row, return_inverse=True)
     _check_number(table, len(frames))
@@ -239,7 +245,7 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     pixels = table.numbers_or_none(columns)
     # Programs write (0, 0), (-1, -1), (-9999, -9999) for centres that they lack.
     x, y = pixels.T
-    is_mark = (x == np.round(x)) & ((x <= 0) | np.isin(x, NOWHERE))
+    is_mark = (x <= 0) | np.isin(np.floor(x), NOWHERE)
     nothing = (x == y) & is_mark | (x == -1) | (y == -1)
     for column, name in enumerate(table.header):
         if re.fullmatch(STATE, name):

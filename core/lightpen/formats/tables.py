@@ -4,6 +4,7 @@ import csv
 import io
 import math
 import re
+import statistics
 import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +32,7 @@ NOTHING = frozenset(
         *("", "nan", "na", "n/a", "n.a.", "#n/a", "#nv", "none", "null", "missing"),
         *("-", "--", ".", "?", "inf", "-inf", "infinity", "-nan", "nan(ind)"),
         *("-nan(ind)", "1.#qnan", "1.#qnan0", "-1.#ind", "-1.#ind00"),
+        *("#div/0!", "#num!", "#zahl!", "#ref!", "#bezug!", "#value!", "#wert!"),
     )
 )
 
@@ -281,6 +283,7 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         header = tuple(cell.casefold() for cell in rows.pop(0))
         number = numbers.pop(0)
         if not is_foreign:
+            header = _with_lines_below(header, rows, numbers)
             _check_header(header, number, name)
         # Of recordings that were joined, each has the header.
         kept = [tuple(map(str.casefold, row)) != header for row in rows]
@@ -303,11 +306,34 @@ def _plain(name: str) -> str:
     return re.sub(r"[\W_]", "", re.sub(_IN_BRACKETS, "", name)) or name
 
 
+def _with_lines_below(
+    header: tuple[str, ...], rows: list[list[str]], numbers: list[int]
+) -> tuple[str, ...]:
+    """Return unique names of columns, of several lines, which are taken off the rows.
+
+    A name that stands above several columns stands in the first of their cells.
+    """
+    while len(set(header)) < len(header) and rows:
+        if any(map(_looks_numeric, rows[0])):
+            break
+        above, names = "", []
+        for cell, below in zip(header, rows.pop(0), strict=True):
+            above = cell or above
+            names.append(f"{above} {below}".strip().casefold())
+        header = tuple(names)
+        numbers.pop(0)
+    return header
+
+
 def _n_titles(rows: list[list[str]]) -> int:
-    """Return the number of lines above the names, which have few of the cells."""
+    """Return the number of lines above the names, which have fewer cells."""
     filled = [len(row) - row.count("") for row in rows]
-    usual = sorted(filled)[len(filled) // 2]
-    n_titles = next(i for i, count in enumerate(filled) if 2 * count > usual)
+    usual, length = sorted(filled)[len(filled) // 2], statistics.mode(map(len, rows))
+    n_titles = next(
+        i
+        for i, count in enumerate(filled)
+        if len(rows[i]) >= length and 2 * count > usual
+    )
     if any(map(_looks_numeric, rows[n_titles])) and rows[0] != [str(len(rows) - 1)]:
         return 0  # unless they count the lines below
     words = list(

@@ -4928,10 +4928,6 @@
         <translation>检查工件、装夹和清洁度，然后重新测量。</translation>
     </message>
     <message>
-        <source>Complete the line; if it is the last one, the file is cut short.</source>
-        <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
-    </message>
-    <message>
         <source>Cone by the nominal tip / mm</source>
         <translation>按标称测头得到的锥孔 / mm</translation>
     </message>
@@ -4986,6 +4982,10 @@
     <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
         <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
+    </message>
+    <message>
+        <source>Complete the line, or write several tables as one; if it is the last line, the file is cut short.</source>
+        <translation>请补全该行，或将多个表格合并为一个；如果是最后一行，则文件不完整。</translation>
     </message>
     <message>
         <source>Cone or camera moved</source>
@@ -5158,6 +5158,10 @@
     <message>
         <source>Line {line} of {name} is not valid YAML ({problem}). Check that this is the right file, whole and in a form that the documents list under input files.</source>
         <translation>{name} 第 {line} 行不是有效的 YAML（{problem}）。请确认文件正确、完整，且格式为文档“输入文件”中所列的一种。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name}: duplicate column {column} in the header. Give each column a unique name, in one line.</source>
+        <translation>{name} 第 {line} 行：表头中 {column} 出现两次。请在一行中给每一列不同的名称。</translation>
     </message>
     <message>
         <source>Line {line} of {name}: the quotation marks do not pair up. Remove or complete them.</source>
@@ -5458,10 +5462,6 @@
     <message>
         <source>Swing: min. images</source>
         <translation>摆动：最少图像数</translation>
-    </message>
-    <message>
-        <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera.</source>
-        <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
     <message>
         <source>The LEDs move by {size:.3f} px (RMS) against each other with the tilt of the pen: it bends under its weight, or LEDs are loose. The result is corrected and U includes the rest. Stiffen the pen, and check how the LEDs are fixed.</source>
@@ -6070,6 +6070,10 @@
     <message>
         <source>{name} does not state the unit of its coordinates. State it in the header: led,x_mm,y_mm,z_mm.</source>
         <translation>{name} 未注明坐标单位。请在表头中注明：led,x_mm,y_mm,z_mm。</translation>
+    </message>
+    <message>
+        <source>{name} has a column {column}: its whole numbers x and y seem to be the corners of boxes. Write the centres of LEDs, as columns cx,cy.</source>
+        <translation>{name} 有 {column} 列：其整数 x 和 y 似乎是方框的角点。请写入 LED 的中心，列名为 cx,cy。</translation>
     </message>
     <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
@@ -6996,10 +7000,6 @@
         <translation>{name} 第 {line} 行有标签 {tag}。出于安全原因，只读取普通数值和 OpenCV 矩阵。请删除该标签，或使用来源可信的文件。</translation>
     </message>
     <message>
-        <source>Line {line} of {name}: duplicate column {column} in the header. Give each column a unique name.</source>
-        <translation>{name} 第 {line} 行：表头中 {column} 出现两次。请给每一列不同的名称。</translation>
-    </message>
-    <message>
         <source>Live stream not available at {place}: {reason}. Choose a free port from 1024 to 65535.</source>
         <translation>无法在 {place} 提供实时数据流：{reason}。请选择 1024 到 65535 之间空闲的端口。</translation>
     </message>
@@ -7334,6 +7334,10 @@
     <message>
         <source>Standard deviation {axis}</source>
         <translation>标准偏差 {axis}</translation>
+    </message>
+    <message>
+        <source>The LED centres reach from {near} to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera; (0, 0) px must be the top left pixel.</source>
+        <translation>LED 中心的范围是 {near} 至 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件；(0, 0) px 必须是左上角的像素。</translation>
     </message>
     <message>
         <source>The camera moved during the swing: fixed lamps in view and the pen shifted by {shift:.2f} px. The result is corrected. Clamp the camera and let it warm up.</source>

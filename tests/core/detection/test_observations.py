@@ -230,3 +230,10 @@ def test_leds_that_are_too_small_are_reported_with_what_is_needed() -> None:
     assert found.advice is not None
     assert found.advice.code == "images.too-small"
     assert "at least 4 px are needed" in str(found.advice)
+
+
+def test_centres_counted_from_another_corner_are_named(plan: ScenePlan) -> None:
+    pixels = true_centers(plan) - [CAMERA.width, CAMERA.height]
+    centers = Centers(np.arange(6), pixels, Path("a.csv"))
+    with pytest.raises(FileError, match=r"reach from \(-\d+, -\d+\) to .* top left"):
+        observe_centers(centers, CAMERA, PEN)

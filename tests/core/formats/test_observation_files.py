@@ -72,6 +72,11 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         (HEADER + ",x1,y1,x2,y2", "7,1,1.5,2.5,0,0,0,0", "2,1,3,4,,,,", "7,3,5,6,,,,"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
         ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
+        (
+            "Frame,Feature 1 - X (px),Feature 1 - Y (px),Point#3 x,Point#3 y",
+            *("7,1.5,2.5,5,6", "2,3,4,,"),
+        ),
+        ("t;LED 1;;LED 3;", ";x;y;x;y", "7;1.5;2.5;5;6", "2;3;4;;"),
         ("t;LED 1/X;LED 1/Y;LED 3/X;LED 3/Y", "7;1.5;2.5;5;6", "2;3;4;;"),
         ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
         ("frame_index,particle,y,x", "7,1,2.5,1.5", "2,1,4,3", "7,3,6,5"),
@@ -87,7 +92,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             "of each LED, too",
             "a line for a frame",
             "names in front",
-            "of Kinovea",
+            *("of ProAnalyst and TEMA", "two lines of names", "of Kinovea"),
             "with units",
             "of trackpy",
             "units",
@@ -130,6 +135,21 @@ def test_columns_have_the_names_that_people_write(tmp_path: Path, header: str) -
     assert found.pixels[0, 1].tolist() == [1.5, 2.5]
 
 
+def test_corners_of_boxes_are_no_centres(tmp_path: Path) -> None:
+    lines = ("frame,led,x,y,w,h,cx,cy", "3,1,10,20,5,5,12.25,22.5")
+    found = read_centers(saved(tmp_path, *lines), 1)
+    assert found.pixels.tolist() == [[[12.25, 22.5]]]
+    said = refusal_of_centers(tmp_path, "frame,led,x,y,w,h", "3,1,10,20,5,5")
+    assert "column w: its whole numbers x and y seem to be the corners" in said
+    named = saved(tmp_path, "frame,led,x,y,w,h", "3,1,10.5,20,5,5")
+    assert read_centers(named, 1).pixels.tolist() == [[[10.5, 20]]]
+
+
+def test_lines_about_the_recording_may_stand_above(tmp_path: Path) -> None:
+    lines = ("File,a.avi", "Resolution,2448,2048", "", "Frame,LED,X,Y", "3,1,1.5,2.5")
+    assert read_centers(saved(tmp_path, *lines), 1).frames.tolist() == [3]
+
+
 def test_a_frame_without_number_is_that_of_the_line_above(tmp_path: Path) -> None:
     """A spreadsheet names it in the first cell of those that were merged."""
     rows = ("1;1;10;20", ";2;30;40", "2;1;11;21", ";2;31;41")
@@ -150,7 +170,8 @@ def test_names_of_columns_may_be_in_shift_jis(tmp_path: Path) -> None:
     [
         *("-1,-1", "0,0", ",", "nan,nan", "NaN,", "#N/A,#N/A", "-9999,-9999"),
         *("inf,inf", "-nan(ind),-nan(ind)", "-nan,-nan", "1.#QNAN,1.#QNAN"),
-        *("-1,200", "9999,9999", "65535,65535"),
+        *("-1,200", "9999,9999", "65535,65535", "-9999.9999,-9999.9999"),
+        *("#DIV/0!,#DIV/0!", "#WERT!,#WERT!"),
     ],
 )
 def test_centres_of_leds_that_are_not_seen_are_left_out_and_counted(
