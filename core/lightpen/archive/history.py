@@ -33,7 +33,7 @@ from lightpen.archive.chains import (
 from lightpen.archive.store import ENTRIES, Database
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.files import write_whole
-from lightpen.formats.tables import csv_table
+from lightpen.formats.spreadsheets import csv_table
 from lightpen.model.limits import DueRule
 from lightpen.model.names import folded_name
 from lightpen.record.library.tip_library import Library

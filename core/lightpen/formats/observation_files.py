@@ -35,7 +35,8 @@ from lightpen.formats.pose_files import (
     read_sequence,
     refuse_foreign_poses,
 )
-from lightpen.formats.tables import NOTHING, Table, parse_table, table_text
+from lightpen.formats.spreadsheets import table_text
+from lightpen.formats.tables import NOTHING, Table, parse_table
 from lightpen.messages import Message, message, printable
 from lightpen.model.rigid import nearest_rotation
 

@@ -70,7 +70,8 @@ from lightpen.formats.pen_tables import (
     stated_numbers,
     unit_normal,
 )
-from lightpen.formats.tables import parse_table, table_text
+from lightpen.formats.spreadsheets import table_text
+from lightpen.formats.tables import parse_table
 from lightpen.messages import message, printable
 from lightpen.model.pen import DISC_DIAMETER, Pen, check_frame, check_leds, in_pen_frame
 from lightpen.model.self_calibration import MARK_DIGITS, FoundPen

@@ -124,7 +124,7 @@ _NOMINAL = " nominal"
 _NORMALS = (("nx",), ("ny",), ("nz",))
 _ACTUAL = r"(?:actual|act|measured|meas|istwert|ist)"
 _OF_PLAN = r"(nominal|nom|sollwert|soll)"
-_PLACE = r"(?:pos(?:ition)?|[ck]oord(?:inate)?|坐标)"
+_PLACE = r"(?:pos(?:ition)?|axis|cent(?:er|re)|[ck]oord(?:inate)?|坐标)"
 _COLUMN = (
     rf"(?:{_ACTUAL}[\s_-]+|{_OF_PLAN}[\s_-]+)?"
     rf"(?:{_PLACE}[\s_.-]*)?"

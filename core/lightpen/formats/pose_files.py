@@ -28,7 +28,7 @@ from lightpen.formats.pose_columns import (
     tools_of,
     without_names,
 )
-from lightpen.formats.tables import Table
+from lightpen.formats.tables import NOTHING, Table, number_flaw
 from lightpen.messages import Message, message, printable
 
 METRES_BELOW = 10.0  # mm of a typical translation; no pen is as close to its tracker
@@ -82,6 +82,9 @@ def is_own(table: Table) -> bool:
 def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
     """Return the poses of a tool in a table of another program."""
     if not table.header:
+        if not all(cell in NOTHING or not number_flaw(cell) for cell in table.rows[0]):
+            n_columns = table.n_columns
+            raise FileError("poses.no-header", name=table.name, n_columns=n_columns)
         values = table.numbers_or_none(range(table.n_columns))
         return _given(*without_names(values, table.name), None, table.name)
     table, units = without_units(table)

@@ -1,32 +1,27 @@
 """Tables in delimited text: comma, semicolon, tab or blanks; decimal comma; header."""
 
 import csv
-import io
 import math
 import re
 import statistics
-import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import compress, takewhile
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import quoted, read_bytes, text_of
-from lightpen.messages import Message, message, printable
+from lightpen.formats.files import quoted
+from lightpen.messages import Message, message
 
 MAX_LINES = 300_000  # 0.2 GB while they are read
 MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of LED numbers
 LARGEST_MOMENT = 2**63 - 1  # of frame numbers: nanoseconds have 19 digits
 DECIMALS = 9  # of times
-LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
-FEWEST_CELLS = 3  # of a row of a table in a workbook
 NOTHING = frozenset(
     (
         *("", "nan", "na", "n/a", "n.a.", "#n/a", "#nv", "none", "null", "missing"),
@@ -194,57 +189,6 @@ class Table:
         )
 
 
-def table_text(
-    path: Path, what: Message, limit: int, refuse: Callable[[bytes, str], None]
-) -> str:
-    """Return the text of a table; of a workbook, its first sheet with one.
-
-    ``refuse`` takes the content and the name of any other file, and raises `FileError`
-    if it is of another program.
-    """
-    data, name = read_bytes(path, what, limit), printable(path.name)
-    if _is_workbook(data):
-        return _workbook_text(data, name)
-    refuse(data, name)
-    return text_of(data, path, what)
-
-
-def _is_workbook(data: bytes) -> bool:
-    """Return whether the content of a file is that of a workbook: xlsx, ods or xls."""
-    parts = (b"xl/workbook", b"content.xml")
-    is_packed = data.startswith(b"PK\x03\x04") and any(each in data for each in parts)
-    return is_packed or data.startswith(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
-
-
-def _workbook_text(data: bytes, name: str) -> str:
-    """Return the first sheet of a workbook with a table, as lines with tabs."""
-    try:
-        from python_calamine import CalamineError, CalamineWorkbook
-    except ImportError as error:
-        raise FileError("workbook.no-reader", name=name) from error
-    try:
-        if data.startswith(b"PK"):
-            with zipfile.ZipFile(io.BytesIO(data)) as packed:
-                size = sum(each.file_size for each in packed.infolist())
-            if size > LARGEST_WORKBOOK:
-                raise FileError("workbook.large", name=name)
-        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
-        for index in range(len(book.sheet_names)):
-            rows = book.get_sheet_by_index(index).to_python(skip_empty_area=True)
-            rows = [row for row in rows if any(cell != "" for cell in row)]
-            if sum(len(row) - row.count("") >= FEWEST_CELLS for row in rows) > 1:
-                return "".join("\t".join(map(_cell, row)) + "\n" for row in rows)
-    except (CalamineError, zipfile.BadZipFile, OSError, ValueError) as error:
-        raise FileError("workbook.damaged", name=name) from error
-    raise FileError("table.no-rows", name=name)
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
-        return str(int(value))
-    return " ".join(str(value).split())
-
-
 def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     r"""Read a table from a text with ``\n`` at the line ends.
 
@@ -269,6 +213,8 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     numbers = [number for number, _ in lines]
     _check_cells(lines, separator, name)
     rows = [_cells(line, separator, number, name) for number, line in lines]
+    if separator is None and len(rows[0]) == 1 < len(rows[-1]):
+        rows[0] = rows[0][0].split(",")  # only the names are separated by commas
     while all(row[-1] == "" and len(row) > 1 for row in rows):
         rows = [row[:-1] for row in rows]
     if n_titles := _n_titles(rows):
@@ -289,7 +235,7 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         kept = [tuple(map(str.casefold, row)) != header for row in rows]
         rows, numbers = list(compress(rows, kept)), list(compress(numbers, kept))
     else:
-        header = _header_in_comment(text, separator, len(rows[0]))
+        header = _header_in_comment(text, separator, rows[0], is_foreign)
         if (
             separator is None
             and not is_foreign
@@ -339,11 +285,12 @@ def _n_titles(rows: list[list[str]]) -> int:
     words = list(
         takewhile(lambda row: not any(map(_looks_numeric, row)), rows[n_titles:])
     )
-    if n_titles + len(words) == len(rows):
+    if not words or n_titles + len(words) == len(rows):
         return n_titles
     # The last with the most names: units, which are equal, may stand below them.
-    n_names = [(len({*row} - {""}), i) for i, row in enumerate(words)]
-    return n_titles + max(n_names, default=(0, 0))[1]
+    n_names, best = max((len({*row} - {""}), i) for i, row in enumerate(words))
+    is_unique = n_names == len(words[best]) - words[best].count("")
+    return n_titles + (best if is_unique else 0)
 
 
 def _moment(cell: str) -> str:
@@ -357,16 +304,22 @@ def _moment(cell: str) -> str:
 
 
 def _header_in_comment(
-    text: str, separator: str | None, length: int
+    text: str, separator: str | None, row: list[str], is_foreign: bool
 ) -> tuple[str, ...]:
-    """Return the names of the last comment before the data, if it has as many."""
+    """Return the names of the last comment before the data, if it has as many.
+
+    In a foreign table, rows with words may be longer.
+    """
     header: tuple[str, ...] = ()
     for line in text.split("\n"):
         if line.strip() and not re.match(_COMMENT, line):
             break
         cells = [c.strip() for c in line.strip().lstrip("#%/ ").split(separator)]
         header = tuple(cell.casefold() for cell in cells) if line.strip() else header
-    return header if len(header) == length else ()
+    has_words = not all(map(_looks_numeric, filter(None, row)))
+    if header and is_foreign and separator and has_words:
+        header += ("",) * (len(row) - len(header))
+    return header if len(header) == len(row) else ()
 
 
 def number_flaw(text: str) -> Message | None:
@@ -430,7 +383,6 @@ def _separator(lines: list[str]) -> str | None:
 def _cells(line: str, separator: str | None, number: int, name: str) -> list[str]:
     if '"' not in line:
         return [cell.strip() for cell in line.split(separator)]
-    import csv
 
     try:
         if separator is None:
@@ -495,30 +447,3 @@ def _check_header(header: tuple[str, ...], number: int, name: str) -> None:
                 "table.column-twice", line=number, name=name, column=quoted(column)
             )
         seen.add(column)
-
-
-# CSV tables without formulas for spreadsheets [1]_.
-#
-# References
-# ----------
-# .. [1] OWASP, "CSV Injection", https://owasp.org/www-community/attacks/CSV_Injection.
-
-
-# First characters of texts that a spreadsheet evaluates, also in full width.
-_FORMULA = (*"=+-@\t\r\n", *"\uff1d\uff0b\uff0d\uff20")
-
-
-def csv_table(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as CSV; a text that could be a formula begins with an apostrophe.
-
-    Numbers stay numbers.
-    """
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerows([_shown(cell) for cell in row] for row in rows)
-    return lines.getvalue()
-
-
-def _shown(value: object) -> object:
-    is_formula = isinstance(value, str) and value.lstrip(" ").startswith(_FORMULA)
-    return f"'{value}" if is_formula else value

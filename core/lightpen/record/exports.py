@@ -14,7 +14,7 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.files import FileFormat, create_whole
 from lightpen.formats.own_json import record_bytes
-from lightpen.formats.tables import csv_table
+from lightpen.formats.spreadsheets import csv_table
 from lightpen.messages import Message, message
 from lightpen.model.names import Laboratory, Origin
 from lightpen.record.calibrations import CalibrationFile, parse_calibration, status_of

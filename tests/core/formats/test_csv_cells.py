@@ -5,7 +5,7 @@ import io
 
 import pytest
 
-from lightpen.formats.tables import csv_table
+from lightpen.formats.spreadsheets import csv_table
 
 
 @pytest.mark.parametrize(

@@ -152,6 +152,7 @@ def cmm(columns: str, values: str, units: str = "") -> str:
             "{x};{nx};{y};{ny};{z}",
             "",
         ),
+        ("Axis X;Centre Y;Center Z", "{x};{y};{z}", ";mm;mm;mm"),
         ("X-Koordinate;Y-Koordinate;Z-Koordinate", "{x};{y};{z}", ";mm;mm;mm"),
         ("X-Wert;Y-Wert;Z-Wert", "{x};{y};{z}", ";mm;mm;mm"),
         (

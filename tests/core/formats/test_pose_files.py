@@ -42,6 +42,20 @@ def ndi(states: list[str]) -> list[str]:
     return [header, *rows(ones, ports, frames, states, numbers, markers)]
 
 
+def of_ndi_sample() -> list[str]:
+    """Return lines with the header in a comment, and more markers than it names."""
+    header = "#Tools,ToolInfo,Frame#,Status,Q0,Qx,Qy,Qz,Tx,Ty,Tz,Error,Markers"
+    poses = np.hstack([np.roll(QUATERNIONS, 1, axis=1), MOVED])
+    around = ["1,870 s/n:3A"] * N_POSES, np.arange(N_POSES), ["OK"] * N_POSES
+    lines = rows(*around, poses, ["0.1,1,OK,1,2,3"] * N_POSES)
+    return [header, *(line.replace("\t", ",") for line in lines)]
+
+
+def names_with_commas() -> list[str]:
+    numbers = rows(np.arange(N_POSES), MOVED, QUATERNIONS)
+    return ["ID,TX,TY,TZ,QX,QY,QZ,QW", *(line.replace("\t", " ") for line in numbers)]
+
+
 def scalar_last() -> list[str]:
     header = "time\tqx\tqy\tqz\tqw\ttx_mm\tty_mm\ttz_mm"
     return [header, *rows(np.arange(N_POSES), QUATERNIONS, MOVED)]
@@ -108,6 +122,8 @@ def named_by_tool() -> list[str]:
     [
         *(
             of_zed,
+            of_ndi_sample,
+            names_with_commas,
             in_german,
             in_chinese,
             scalar_last,
@@ -390,4 +406,12 @@ def test_euler_angles_of_motive_are_refused(tmp_path: Path) -> None:
     path.write_text(text)
 
     with pytest.raises(FileError, match="quaternions"):
+        read_poses(path)
+
+
+def test_words_without_names_of_columns_need_names(tmp_path: Path) -> None:
+    path = tmp_path / "printed.csv"
+    path.write_text("1,Port:10,OK,1,0,0,0,5,6,7\n2,Port:10,OK,1,0,0,0,5,6,8\n")
+
+    with pytest.raises(FileError, match=r"no header and 10 columns.* header line on"):
         read_poses(path)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import PEN_FILE
-from lightpen.formats.tables import Table, number_flaw, parse_table, table_text
+from lightpen.formats.spreadsheets import table_text
+from lightpen.formats.tables import Table, number_flaw, parse_table
 from lightpen.messages import message
 
 LEDS = message("table.of-leds")

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.files import FileFormat
-from lightpen.formats.tables import csv_table
+from lightpen.formats.spreadsheets import csv_table
 from lightpen.messages import Message, Number, message
 from lightpen.model.artefacts import SIDES, Side
 from lightpen.model.coverage import Decision
