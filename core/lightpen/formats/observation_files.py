@@ -75,10 +75,10 @@ _LED = (
 )
 _PIXEL = tuple(
     (
-        *(f"{axis}_px", f"c{axis}", f"{axis}c"),
-        *(f"{word}_{axis}" for word in _PLACES),
-        *(f"{axis}_{word}" for word in _PLACES),
-        *(axis, f"{other}_px", other, f"{axis}_pixel", f"pixel_{axis}", f"p{axis}"),
+        *(f"{axis}_px", f"{other}_px", other, f"c{axis}", f"{axis}c"),
+        *(f"{word}_{axis}{unit}" for word in _PLACES for unit in ("", "_px")),
+        *(f"{axis}_{word}{unit}" for word in _PLACES for unit in ("", "_px")),
+        *(axis, f"{axis}_pixel", f"pixel_{axis}", f"p{axis}"),
         *(f"{axis}坐标", f"{axis}座標", *further),
     )
     for axis, other, *further in (

@@ -39,7 +39,7 @@ _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
 _COMMENT = r"\s*(?:[#%]|//)"  # of MATLAB and C++, too
 # Full-width characters, minus signs that are not of ASCII, blanks within numbers.
 _PLAIN: dict[int, str] = {0xFF01 + i: chr(0x21 + i) for i in range(94)}
-_PLAIN |= {0x2212: "-", 0x2013: "-", 0x2009: "", 0x202F: ""}
+_PLAIN |= {0x2212: "-", 0x2013: "-", 0x00A0: "", 0x2009: "", 0x202F: ""}
 _FORTRAN = r"(?a)(?<=\d)[dD](?=[+-]\d)"  # the E of a number
 _BLANKS = r" *\S+( +[+-]?\d+,\d+){2,} *"  # between numbers with decimal commas
 _CELL = r"[^\s;,|=+:-]"  # lines of a spreadsheet and rules have none

@@ -6076,6 +6076,10 @@
         <translation>{name} 有 {column} 列：其整数 x 和 y 似乎是方框的角点。请写入 LED 的中心，列名为 cx,cy。</translation>
     </message>
     <message>
+        <source>{name} has a header but no rows below it. Check that it is complete.</source>
+        <translation>{name} 有表头，但下面没有数据行。请检查文件是否完整。</translation>
+    </message>
+    <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
     </message>
@@ -6658,10 +6662,6 @@
     <message>
         <source>{name} has LED discs {diameter:g} mm wide. A diameter of up to {most:g} mm is needed; check its units.</source>
         <translation>{name} 的 LED 发光面直径为 {diameter:g} mm。直径不得超过 {most:g} mm；请检查单位。</translation>
-    </message>
-    <message>
-        <source>{name} has a header but no rows below it.</source>
-        <translation>{name} 只有表头，下面没有数据行。</translation>
     </message>
     <message>
         <source>{name} has a skew of {skew:g} px; cameras without skew are needed. Calibrate the camera again without estimating a skew.</source>

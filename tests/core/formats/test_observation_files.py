@@ -125,11 +125,13 @@ def test_centres_are_sorted_by_frame_and_led(
         ),
         *("frameNumber;Marker #;X-Koordinate;Y-Koordinate", "img;dot;row;column"),
         *("Slice;label;centroid-1;centroid-0", "image_file;keypoint;x_img;y_img"),
+        *("Frame_ID;LED_Name;Pos_X_px;Pos_Y_px", "t;led;u;v;X;Y;Z"),
     ],
 )
 def test_columns_have_the_names_that_people_write(tmp_path: Path, header: str) -> None:
     columns = header.split(";")
     line = "7;LED2;2.5;1.5" if columns[2] == "row" else "7;LED2;1.5;2.5"
+    line += ";30;40;500" * (len(columns) > 4)
     found = read_centers(saved(tmp_path, header, line), 2)
     assert found.frames.tolist() == [7]
     assert found.pixels[0, 1].tolist() == [1.5, 2.5]
