@@ -33,7 +33,7 @@ _UNIT = (
     rf"(?:(?:[\s_./]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
-_ROTATING = {"r", "q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
+_ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
 _ROTATING |= {"四元数", "旋转", "姿态", "o"}  # ox to ow of ZED
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
 _MOVING |= {"平移", "位置", "坐标"}
@@ -143,7 +143,7 @@ def _role(name: str, tools: Container[str] = ()) -> _Role | None:
     tool = re.sub(r"[\W_]*(" + "|".join(_ROTATING | _MOVING) + r")$", "", stem)
     if words & _VECTORS and axis in {*"xyz"}:
         return _Role("v", axis, unit, tool)
-    if words & _ROTATING and axis in {*"wxyz", *_SCALARS}:
+    if (words & _ROTATING or stem == "r") and axis in {*"wxyz", *_SCALARS}:
         return _Role("q", _SCALARS.get(axis, axis), unit, tool)
     if axis in {*"xyz"} and (words & _MOVING or not words or stem in tools):
         return _Role("t", axis, unit, tool)

@@ -102,6 +102,14 @@ def matrices_by_columns() -> list[str]:
     return [names, *rows(np.swapaxes(whole, 1, 2).reshape(N_POSES, 16))]
 
 
+def of_euroc() -> list[str]:
+    places = "\t".join(f" p_RS_R_{axis} [m]" for axis in "xyz")
+    turns = "\t".join(f" q_RS_{axis} []" for axis in "wxyz")
+    header = f"#timestamp\t{places}\t{turns}\t v_RS_R_x [m s^-1]"
+    quaternions, still = np.roll(QUATERNIONS, 1, axis=1), np.zeros(N_POSES)
+    return [header, *rows(np.arange(N_POSES), MOVED / 1e3, quaternions, still)]
+
+
 def of_vive() -> list[str]:
     header = "time\tx\ty\tz\tr_x\tr_y\tr_z\tr_w"
     return [header, *rows(np.arange(N_POSES), MOVED, QUATERNIONS)]
@@ -132,6 +140,7 @@ def named_by_tool() -> list[str]:
             matrices,
             matrices_by_columns,
             vectors,
+            of_euroc,
             of_vive,
             named_by_tool,
         ),
