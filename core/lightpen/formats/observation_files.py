@@ -89,7 +89,8 @@ _PIXEL = tuple(
 _BOX = ("w", "width", "h", "height")
 _APART = r"[ _.:/#-]*"
 _OF_LED = rf"(?:led|{'|'.join(_POINTS)}|pt|p|m)?{_APART}(\d+)"  # in a column's name
-_WIDE = rf"(?a)(?:{_OF_LED}{_APART}([xy])|([xy]){_APART}{_OF_LED})(_px| *[\[(].*)?"
+_WIDE = rf"(?a)(?:{_OF_LED}{_APART}([xyuv])|([xyuv]){_APART}{_OF_LED})(_px| *[\[(].*)?"
+_AXES = {"x": "x", "y": "y", "u": "x", "v": "y"}
 _LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"
 _CENTERS = (_FRAME, _LED, *_PIXEL)
 _UNLABELLED = (_FRAME, *_PIXEL)
@@ -183,7 +184,7 @@ def _refuse_foreign(data: bytes, name: str) -> None:
 def _long(table: Table) -> Table:
     """Return a table with a line for each LED, also if it has columns of each LED."""
     places = {
-        (named[2] or named[3], int(named[1] or named[4])): i
+        (_AXES[named[2] or named[3]], int(named[1] or named[4])): i
         for i, column in enumerate(table.header)
         if (named := re.fullmatch(_WIDE, column))
     }

@@ -71,6 +71,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
         (HEADER + ",x1,y1,x2,y2", "7,1,1.5,2.5,0,0,0,0", "2,1,3,4,,,,", "7,3,5,6,,,,"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
+        ("frame,u1,v1,u3,v3", "7,1.5,2.5,5,6", "2,3,4,,"),
         ("led3_x,led3_y,led1_x,led1_y,t", "5,6,1.5,2.5,7", "NaN,NaN,3,4,2"),
         (
             "Frame,Feature 1 - X (px),Feature 1 - Y (px),Point#3 x,Point#3 y",
@@ -90,7 +91,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         *("of a spreadsheet", "of MATLAB", "names", "paths", "a frame without LEDs"),
         *(
             "of each LED, too",
-            "a line for a frame",
+            *("a line for a frame", "of u and v"),
             "names in front",
             *("of ProAnalyst and TEMA", "two lines of names", "of Kinovea"),
             "with units",
