@@ -61,7 +61,7 @@ _PLACES = (
 )
 _FRAME = (
     *(f"frame{end}" for end in _NUMBER),
-    *(f"{word}{end}" for word in ("image", "img", "picture") for end in _NUMBER),
+    *(f"{word}{end}" for word in ("image", "img", "photo") for end in _NUMBER),
     *("filename", "file", "image_file", "path", "slice", "shot", "bild", "bild_nr"),
     *("bildnummer", "帧", "帧号", "帧序号", "图像", "图像编号", "图片", "フレーム"),
     *("フレーム番号", "time", "timestamp", "stamp", "datetime", "zeit", "zeitstempel"),

@@ -43,6 +43,7 @@ _PLAIN |= {0x2212: "-", 0x2013: "-", 0x00A0: "", 0x2009: "", 0x202F: ""}
 _FORTRAN = r"(?a)(?<=\d)[dD](?=[+-]\d)"  # the E of a number
 _BLANKS = r" *\S+( +[+-]?\d+,\d+){2,} *"  # between numbers with decimal commas
 _CELL = r"[^\s;,|=+:-]"  # lines of a spreadsheet and rules have none
+_CELL_OF_TWO_LINES = r'(?m)(?:^|(?<=[;,\t]))"[^"\n]*\n[^"\n]*"(?=[;,\t\n])'
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
 _LED_NAME = r"(?a)^(#|[^\W\d_]).*?(?=\d+$)"
@@ -202,6 +203,7 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
         raise FileError("table.json", name=name)
     text = text if text.isascii() else text.translate(_PLAIN)
     text = re.sub(_FORTRAN, "e", text)
+    text = re.sub(_CELL_OF_TWO_LINES, lambda cell: cell[0].replace("\n", " "), text)
     lines = _filled_lines(text, name)
     separator = _separator([line for _, line in lines])
     hint = re.fullmatch(r"sep=([;,\t|])\s*", lines[0][1])  # of Excel, to itself
@@ -215,6 +217,10 @@ def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
     rows = [_cells(line, separator, number, name) for number, line in lines]
     if separator is None and len(rows[0]) == 1 < len(rows[-1]):
         rows[0] = rows[0][0].split(",")  # only the names are separated by commas
+    if separator is None and len(rows[0]) + 1 == len(rows[-1]):
+        counts = [row[0] for row in rows[1:]]
+        if any(counts == list(map(str, range(i, i + len(counts)))) for i in (0, 1)):
+            rows[0].insert(0, "")  # R and pandas count the rows
     while all(row[-1] == "" and len(row) > 1 for row in rows):
         rows = [row[:-1] for row in rows]
     if n_titles := _n_titles(rows):
@@ -259,8 +265,8 @@ def _with_lines_below(
 
     A name that stands above several columns stands in the first of their cells.
     """
-    while len(set(header)) < len(header) and rows:
-        if any(map(_looks_numeric, rows[0])):
+    for row in rows[:2]:
+        if len(set(header)) == len(header) or any(map(_looks_numeric, row)):
             break
         above, names = "", []
         for cell, below in zip(header, rows.pop(0), strict=True):

@@ -68,6 +68,8 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
         ),
         (HEADER, "a_07.png,LED1,1.5,2.5", "a_02.png,LED1,3,4", "a_07.png,LED3,5,6"),
         (HEADER, "/a/07.png,#1,1.5,2.5", "/a/02.png,#1,3,4", "/a/07.png,#3,5,6"),
+        ("frame led x y", "0 7 1 1.5 2.5", "1 2 1 3.0 4.0", "2 7 3 5.0 6.0"),
+        ('"frame\nno.",led,"x\n[px]","y\n[px]"', "7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
         (HEADER, "7,1,1.5,2.5", "8,,,", "2,1,3,4", "7,3,5,6"),
         (HEADER + ",x1,y1,x2,y2", "7,1,1.5,2.5,0,0,0,0", "2,1,3,4,,,,", "7,3,5,6,,,,"),
         ("frame,x1,y1,x3,y3", "7,1.5,2.5,5,6", "2,3,4,,"),
@@ -88,7 +90,8 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
     ],
     ids=[
         *("header", "no header", "other order", "more columns"),
-        *("of a spreadsheet", "of MATLAB", "names", "paths", "a frame without LEDs"),
+        *("of a spreadsheet", "of MATLAB", "names", "paths", "printed by pandas"),
+        *("two lines in a cell", "a frame without LEDs"),
         *(
             "of each LED, too",
             *("a line for a frame", "of u and v"),
