@@ -252,7 +252,7 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
     for column, name in enumerate(table.header):
         if re.fullmatch(STATE, name):
             nothing |= np.array([is_lost(row[column], name) for row in table.rows])
-    seen = np.where((nothing | np.isnan(x + y))[:, None], np.nan, pixels)
+    seen = np.where((nothing | np.isnan(pixels).any(axis=1))[:, None], np.nan, pixels)
     size = np.nanmax(np.abs(seen), initial=0)
     if size <= LARGEST_SENSOR and len(seen) > MANY_CENTERS:
         raise FileError("centers.normalised", name=table.name, size=size)

@@ -156,6 +156,11 @@ def test_lines_about_the_recording_may_stand_above(tmp_path: Path) -> None:
     assert read_centers(saved(tmp_path, *lines), 1).frames.tolist() == [3]
 
 
+def test_the_largest_numbers_lie_outside_every_image(tmp_path: Path) -> None:
+    said = refusal_of_centers(tmp_path, HEADER, "1,1,1.7e308,1.7e308")
+    assert "lies outside every image" in said
+
+
 def test_a_frame_without_number_is_that_of_the_line_above(tmp_path: Path) -> None:
     """A spreadsheet names it in the first cell of those that were merged."""
     rows = ("1;1;10;20", ";2;30;40", "2;1;11;21", ";2;31;41")
