@@ -32,6 +32,7 @@ _YAML_TAGS = {
         *("opencv-matrix", "opencv-nd-matrix"),
     )
 }
+_ARRAYS = {"data64F": "data", "data32F": "data"}  # of matrices of OpenCV.js
 _YAML_DIRECTIVE = r"%YAML[: ].*"
 # A table or an entry after comments.
 _TOML = r"""(?a)(?:\s*(?:#.*\n)?)*+(?:\[[\w."'-]+\]\s*(?:#.*)?\n|[\w."'-]+[ \t]*=)"""
@@ -72,6 +73,7 @@ def parse_json(text: str, name: str) -> Tree:
             return [value for _, value in pairs]  # an array of numbers of JavaScript
         mapping: dict[str, Tree] = {}
         for key, value in pairs:
+            key = _ARRAYS.get(key, key)
             if key in mapping:
                 raise FileError("document.given-twice", key=quoted(key), name=name)
             mapping[key] = value

@@ -70,7 +70,7 @@ OPENCV_JS = json.dumps(
         "cameraMatrix": dict(
             enumerate([4638.2, 0, 1219.6, 0, 4637.1, 1031.3, 0, 0, 1])
         ),
-        "distCoeffs": dict(enumerate(DISTORTION.tolist())),
+        "distCoeffs": {"rows": 5, "cols": 1, "data64F": DISTORTION.tolist()},
     }
 )
 KALIBR = """cam0:
