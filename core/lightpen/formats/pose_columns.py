@@ -30,7 +30,7 @@ FEW_POSES = 4
 UNIT_TOLERANCE = 0.01  # of the length of a quaternion
 
 _UNIT = (
-    rf"(?:(?:[\s_./]+[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
+    rf"(?:(?:[\s_./]+(?:in\s+)?[\[(]?|[\[(])({'|'.join(UNIT_NAMES)})[\])]?"
     r"|\s*[\[(]([^\])]*)[\])])$"
 )
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
@@ -45,11 +45,12 @@ _ANGLE = (
 )
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
 _WORDS = r"(?<!in)visib|(?<!in)valid|tracked|tracking|detected"
-STATE = rf".*(state|status|{_WORDS}|\bok|_ok\b).*"
+_WORDS += "|(?<!un)gültig|sichtbar|有效"
+STATE = rf".*(state|status|zustand|状态|{_WORDS}|\bok|_ok\b).*"
 _FLAG = rf"{_WORDS}|ok\b"  # 0 says no; as a state, it may say that all is well
 _LOST = (
     r"(?i)(missing|invalid|lost|disabled|occluded|false|not|no\b|bad|fail|error|out"
-    r"|untracked|unknown|nan).*"
+    r"|untracked|unknown|nan|nein|nicht|ungültig|丢失|无效|否).*"
 )
 
 

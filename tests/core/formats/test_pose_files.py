@@ -182,7 +182,13 @@ def test_few_rows_that_fit_another_order_by_chance_do_not_decide(
 
 @pytest.mark.parametrize(
     ("unit", "size"),
-    [(" [cm]", 10.0), (" [m]", 1000.0), (" [in]", 25.4), (" [um]", 1e-3), ("/mm", 1.0)],
+    [
+        (" [cm]", 10.0),
+        (" [m]", 1000.0),
+        (" [in]", 25.4),
+        (" [um]", 1e-3),
+        (" in mm", 1.0),
+    ],
 )
 def test_the_unit_of_translations_is_that_of_their_names(
     tmp_path: Path, unit: str, size: float
@@ -238,14 +244,19 @@ def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("name", "states"),
-    [("tool is visible", "012"), ("tracking_ok", ["False", "True", "True"])],
+    [
+        ("tool is visible", "012"),
+        ("tracking_ok", ["False", "True", "True"]),
+        ("Gültig", ["nein", "ja", "ja"]),
+        ("状态", ["丢失", "正常", "正常"]),
+    ],
 )
 def test_a_pose_that_a_flag_calls_invalid_is_left_out(
     tmp_path: Path, name: str, states: Sequence[str]
 ) -> None:
     path = tmp_path / "poses.csv"
     rows = [f"{states[i % 3]},1,0,0,0,{i + 1},2,900" for i in range(6)]
-    path.write_text("\n".join([f"{name},qw,qx,qy,qz,tx,ty,tz", *rows, ""]))
+    path.write_text("\n".join([f"{name},qw,qx,qy,qz,tx,ty,tz", *rows, ""]), "utf-8")
 
     assert read_poses(path).places.tolist() == [2, 3, 5, 6]
 
