@@ -2,7 +2,8 @@
 
 A table has the columns ``led,x_mm,y_mm,z_mm``, optionally ``nx,ny,nz`` (normals) and
 ``diameter_mm``. Without a header its columns stand in this order, the normals being
-optional. Units may be written as in ``x_mm``, ``x [mm]``, ``x (m)`` and ``x/inch``.
+optional; three columns are coordinates alone. Units may be written as in ``x_mm``,
+``x [mm]``, ``x (m)`` and ``x/inch``.
 Standard uncertainties (k = 1) are optional columns, the same number in each row:
 ``led_sigma_mm`` of one LED coordinate, ``scale_sigma`` of all coordinates together
 (relative: 1e-5 is 10 um a metre) and ``diameter_sigma_mm``. So are ``expansion``, that

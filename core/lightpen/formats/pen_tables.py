@@ -160,7 +160,9 @@ def from_table(table: Table, units: str | None) -> PenContent:
         bare = replace(bare, rows=[row[:4] for row in bare.rows])
     names: tuple[str, ...] = _LED_NAMES
     is_named = any(name in names for name in bare.header)
-    if not is_named and bare.header[:1] != ("x",):
+    # Three columns without names are coordinates, unless they begin with LED 1.
+    are_places = bare.n_columns == 3 and bare.rows[0][0] not in ("0", "1")
+    if not (is_named or bare.header[:1] == ("x",) or (not bare.header and are_places)):
         # What a measuring program calls its elements, not their groups.
         before = range(bare.header.index("x") if "x" in bare.header else 0)
         own = [

@@ -411,11 +411,19 @@ def test_the_head_of_a_point_cloud_is_no_row(tmp_path: Path, head: str) -> None:
     np.testing.assert_array_equal(read_pen(path, units=units).leds, LEDS)
 
 
-def test_coordinates_alone_are_leds_in_their_order(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("head", "unit"), [("x,y,z\nmm,mm,mm\n", None), ("", "mm")])
+def test_coordinates_alone_are_leds_in_their_order(
+    tmp_path: Path, head: str, unit: str | None
+) -> None:
     rows = [f"{x},{y},{z}\n" for x, y, z in LEDS]
-    path = saved(tmp_path, "x,y,z\nmm,mm,mm\n" + "".join(rows))
+    path = saved(tmp_path, head + "".join(rows))
 
-    np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+    np.testing.assert_array_equal(read_pen(path, unit).leds, LEDS)
+
+
+def test_numbers_and_two_coordinates_are_no_leds(tmp_path: Path) -> None:
+    text = "".join(f"{i} {x} {y}\n" for i, (x, y, _) in enumerate(LEDS, 1))
+    assert "no header and 3 columns" in refusal(tmp_path, text)
 
 
 def test_a_report_with_a_line_for_each_coordinate_is_told_the_columns(
