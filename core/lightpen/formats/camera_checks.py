@@ -13,7 +13,7 @@ LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
 LARGEST_ASPECT = 1.5  # of a pixel
 LARGEST_FOLD = 0.5  # of the image; corners that no view reached fold in many real files
-SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
+SKEW_TOLERANCE = 0.05  # px; a third of it at the edge of a usual image
 
 
 def checked_size(size: tuple[float, float], name: str | Message) -> tuple[int, int]:
@@ -60,7 +60,7 @@ def check_pinhole(
 
 
 def check_skew(skew: float, entries: Entries) -> None:
-    """Refuse a skew, px, that is not zero."""
+    """Refuse a skew, px, that shifts points by more than lenses are uncertain."""
     if abs(skew) > SKEW_TOLERANCE:
         raise FileError("camera-file.skew", name=entries.name, skew=skew)
 

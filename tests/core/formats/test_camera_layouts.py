@@ -245,6 +245,10 @@ GYROFLOW: dict[str, Any] = {
         pytest.param(COLMAP, id="COLMAP"),
         pytest.param(COLMAP.replace("# ", ""), id="COLMAP without marks of comments"),
         pytest.param(METASHAPE, id="Metashape"),
+        pytest.param(
+            METASHAPE.replace("<b1>", "<b2>0.02</b2><b1>"),
+            id="Metashape, a little skew",
+        ),
         pytest.param(calib_io(), id="calib.io"),
         pytest.param(
             json.dumps(calib_io(skew=0))
