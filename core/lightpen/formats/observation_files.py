@@ -53,20 +53,23 @@ ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
 
 # Names of columns, the best first, without regard to blanks and punctuation.
 _NUMBER = ("", "id", "no", "nr", "num", "number", "idx", "index", "nummer", "name")
-_TIMES = ("s", "ms", "us", "ns")
-_POINTS = ("marker", "point", "target", "spot", "blob", "dot", "keypoint", "feature")
+_CLOCKS = ("time", "timestamp", "t", "stamp", "elapsed", "elapsed_time", "zeit")
+_TIMES = ("", "s", "sec", "seconds", "ms", "msec", "us", "ns")
+_POINTS = (
+    *("marker", "point", "pt", "target", "spot", "blob", "dot", "keypoint"),
+    "feature",
+)
 _PLACES = (
     *("center", "centre", "centroid", "position", "pos", "coord", "coordinate"),
     *("koordinate", "image", "img"),
 )
 _FRAME = (
     *(f"frame{end}" for end in _NUMBER),
-    *(f"{word}{end}" for word in ("image", "img", "photo") for end in _NUMBER),
+    *(f"{word}{end}" for word in ("image", "img", "photo", "pic") for end in _NUMBER),
     *("filename", "file", "image_file", "path", "slice", "shot", "bild", "bild_nr"),
     *("bildnummer", "帧", "帧号", "帧序号", "图像", "图像编号", "图片", "フレーム"),
-    *("フレーム番号", "time", "timestamp", "stamp", "datetime", "zeit", "zeitstempel"),
-    *("时间", "x_value", "t"),  # of LabVIEW
-    *(f"{word}_{unit}" for word in ("time", "timestamp") for unit in _TIMES),
+    *("フレーム番号", "datetime", "zeitstempel", "时间", "x_value"),  # of LabVIEW
+    *(f"{word}_{unit}" for unit in _TIMES for word in _CLOCKS),
 )
 _LED = (
     *(f"led{end}" for end in (*_NUMBER, "编号", "号", "番号")),
@@ -88,7 +91,7 @@ _PIXEL = tuple(
 )
 _BOX = ("w", "width", "h", "height")
 _APART = r"[ _.:/#-]*"
-_OF_LED = rf"(?:led|{'|'.join(_POINTS)}|pt|p|m)?{_APART}(\d+)"  # in a column's name
+_OF_LED = rf"(?:led|{'|'.join(_POINTS)}|p|m)?{_APART}(\d+)"  # in a column's name
 _WIDE = rf"(?a)(?:{_OF_LED}{_APART}([xyuv])|([xyuv]){_APART}{_OF_LED})(_px| *[\[(].*)?"
 _AXES = {"x": "x", "y": "y", "u": "x", "v": "y"}
 _LETTER = r"(?i:(?:led|marker)?[ _-]?([a-z]))"

@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from itertools import compress, takewhile
+from itertools import compress, pairwise, takewhile
 from typing import NoReturn
 
 import numpy as np
@@ -47,7 +47,7 @@ _CELL_OF_TWO_LINES = r'(?m)(?:^|(?<=[;,\t]))"[^"\n]*\n[^"\n]*"(?=[;,\t\n])'
 _JSON = r"\s*[\[{]\s*[\"{\[]"
 _IN_BRACKETS = r"\s*(#|[\[(].*[\])])$"  # a unit
 _LED_NAME = r"(?a)^(#|[^\W\d_]).*?(?=\d+$)"
-_FRAME_NAME = r"(?a)[/.~\\]*[^\W\d].*?(\d+)(\.[a-z]+)?"
+_FILE_SUFFIX = r"(?ai)(\.[a-z]\w*)+$"
 _DATE = r"(?a)(\d{4}-\d\d-\d\d[T ])?(\d\d:\d\d:\d\d([.,]\d+)?)(Z|[+-]\d\d:?\d\d)?"
 
 
@@ -131,7 +131,7 @@ class Table:
 
         Times with decimals are counted in thousandths, or in thousandths of these.
         """
-        cells = [_moment(row[column]) for row in self.rows]
+        cells = _moments([row[column] for row in self.rows])
         if any(map(number_flaw, cells)):
             self.numbers([column])  # names the line
         exact = list(map(Decimal, cells))
@@ -284,7 +284,9 @@ def _n_titles(rows: list[list[str]]) -> int:
     n_titles = next(
         i
         for i, count in enumerate(filled)
-        if len(rows[i]) >= length and 2 * count > usual
+        # Names of pairs of columns reach the last pair; titles do not.
+        if len(rows[i]) >= length
+        and (2 * count > usual or (count > 1 and any(rows[i][-2:])))
     )
     if any(map(_looks_numeric, rows[n_titles])) and rows[0] != [str(len(rows) - 1)]:
         return 0  # unless they count the lines below
@@ -299,10 +301,31 @@ def _n_titles(rows: list[list[str]]) -> int:
     return n_titles + (best if is_unique else 0)
 
 
+def _moments(cells: list[str]) -> list[str]:
+    """Return the numbers of frames, also of ``frame_017.png`` and of times.
+
+    Names whose last numbers are not in the order of all their numbers are counted.
+    """
+    moments = list(map(_moment, cells))
+    if any(re.fullmatch(_NUMBER, moment) for moment in moments):
+        return moments
+    digits = {
+        name: [
+            Decimal(n) for n in re.findall(r"(?a)\d+", re.sub(_FILE_SUFFIX, "", name))
+        ]
+        for name in cells
+    }
+    if not all(digits.values()):
+        return moments
+    ordered = sorted(digits, key=digits.__getitem__)
+    number_of = {name: digits[name][-1] for name in ordered}
+    if any(number_of[one] >= number_of[other] for one, other in pairwise(ordered)):
+        number_of = {name: Decimal(i) for i, name in enumerate(ordered, 1)}
+    return [str(number_of[name]) for name in cells]
+
+
 def _moment(cell: str) -> str:
-    """Return the number of a frame, also of ``frame_017.png``, a date or a time."""
-    if named := re.fullmatch(_FRAME_NAME, cell):
-        return named[1]
+    """Return a number, date or time as a number, any other cell as it is."""
     if dated := re.fullmatch(_DATE, cell):
         instant = (dated[1] or "1970-01-01T") + dated[2].replace(",", ".")
         return str(np.datetime64(instant, "ns").astype(np.int64))

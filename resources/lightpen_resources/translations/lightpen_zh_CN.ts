@@ -5464,6 +5464,10 @@
         <translation>摆动：最少图像数</translation>
     </message>
     <message>
+        <source>The LEDs are clipped in most images: they reach the highest level, so their width is not known and their centres are less certain. U includes this. Close the aperture or shorten the exposure.</source>
+        <translation>大多数图像中的 LED 达到最高灰度级（过曝），因此其宽度未知，中心也不够准确；U 已包含此影响。请缩小光圈或缩短曝光时间。</translation>
+    </message>
+    <message>
         <source>The LEDs move by {size:.3f} px (RMS) against each other with the tilt of the pen: it bends under its weight, or LEDs are loose. The result is corrected and U includes the rest. Stiffen the pen, and check how the LEDs are fixed.</source>
         <translation>各 LED 随光笔倾斜相互移动 {size:.3f} px（均方根）：光笔因自重弯曲，或 LED 松动。结果已修正，其余部分计入 U。请加固光笔，并检查 LED 的固定。</translation>
     </message>

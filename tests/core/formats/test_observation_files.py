@@ -80,6 +80,7 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             *("7,1.5,2.5,5,6", "2,3,4,,"),
         ),
         ("t;LED 1;;LED 3;", ";x;y;x;y", "7;1.5;2.5;5;6", "2;3;4;;"),
+        (";LED 1;;LED 3;", "t;x;y;x;y", "7;1.5;2.5;5;6", "2;3;4;;"),
         ("t;LED 1/X;LED 1/Y;LED 3/X;LED 3/Y", "7;1.5;2.5;5;6", "2;3;4;;"),
         ("frame_idx;x1 [px];x3 [px];y1 [px];y3 [px]", "7;1,5;5;2,5;6", "2;3;-1;4;-1"),
         ("frame_index,particle,y,x", "7,1,2.5,1.5", "2,1,4,3", "7,3,6,5"),
@@ -96,7 +97,12 @@ def refusal_of_poses(folder: Path, *lines: str) -> str:
             "of each LED, too",
             *("a line for a frame", "of u and v"),
             "names in front",
-            *("of ProAnalyst and TEMA", "two lines of names", "of Kinovea"),
+            *(
+                "of ProAnalyst and TEMA",
+                "two lines of names",
+                "of a workbook",
+                "of Kinovea",
+            ),
             "with units",
             "of trackpy",
             "units",
@@ -130,6 +136,7 @@ def test_centres_are_sorted_by_frame_and_led(
         *("frameNumber;Marker #;X-Koordinate;Y-Koordinate", "img;dot;row;column"),
         *("Slice;label;centroid-1;centroid-0", "image_file;keypoint;x_img;y_img"),
         *("Frame_ID;LED_Name;Pos_X_px;Pos_Y_px", "t;led;u;v;X;Y;Z"),
+        *("t_ms;led;x;y", "elapsed (s);led;x;y", "img_idx;pt_idx;px;py"),
     ],
 )
 def test_columns_have_the_names_that_people_write(tmp_path: Path, header: str) -> None:
@@ -267,6 +274,30 @@ def test_times_are_frames(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="LED 1 of frame"):
         read_centers(saved(tmp_path, HEADER, *rows), 3)
     assert len(read_centers(saved(tmp_path, HEADER, *rows[:2]), 3).frames) == 2
+
+
+@pytest.mark.parametrize(
+    ("names", "frames"),
+    [
+        (("1764380000123456790.png", "1764380000123456789.png"), None),
+        (("IMG_0017.JPG", "IMG_0002.JPG"), (17, 2)),
+        (("0017_left.ome.tif", "0002_left.ome.tif"), (17, 2)),
+        (("f17_cam1.png", "f2_cam1.png"), (2, 1)),
+        (
+            ("Image__2026-05-03__10-16-05.png", "Image__2026-05-03__10-15-20.png"),
+            (2, 1),
+        ),
+        (("2026/05/03 10:15:21.050", "2026/05/03 10:15:20.950"), (2, 1)),
+    ],
+)
+def test_names_of_images_are_frames_in_their_order(
+    tmp_path: Path, names: tuple[str, str], frames: tuple[int, int] | None
+) -> None:
+    rows = [f"{name},1,{i},3" for i, name in enumerate(names, 1)]
+    found = read_centers(saved(tmp_path, HEADER, *rows), 3)
+    wanted = frames or [int(Path(name).stem) for name in names]
+    np.testing.assert_array_equal(found.frames, sorted(wanted))
+    np.testing.assert_array_equal(found.pixels[:, 0, 0], [2, 1])
 
 
 @pytest.mark.parametrize(

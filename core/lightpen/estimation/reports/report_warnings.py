@@ -56,7 +56,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *([message("warning.own-images")] if calibration.shares_images else []),
         *_noise_warnings(calibration),
         *_self_check_warnings(calibration),
-        *_small_led_warnings(calibration),
+        *_face_warnings(calibration),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)
@@ -107,16 +107,18 @@ def _self_check_warnings(calibration: Calibration) -> list[Message]:
     return [message("warning.self-check", value=check.value, limit=check.limit)]
 
 
-def _small_led_warnings(calibration: Calibration) -> list[Message]:
-    """Return a warning on LEDs too small for the images to show their faces."""
-    seen = [each.observations.edge_widths for each in calibration.cameras]
-    if calibration.stated.reading is not None or not np.isfinite(seen).any():
+def _face_warnings(calibration: Calibration) -> list[Message]:
+    """Return a warning on LEDs too small or too bright to show their faces."""
+    seen = [each.observations for each in calibration.cameras]
+    n_images = np.isfinite([each.edge_widths for each in seen]).sum()
+    if calibration.stated.reading is not None or n_images == 0:
         return []
     bundle = calibration.bundle
     areas = modelled_areas(bundle.state, 0)[bundle.used[:, 0]]
     width = 2 * float(np.sqrt(np.median(areas) / np.pi))
     if width > 2 * LARGEST_RADIUS:
-        return []
+        has_areas = np.isfinite([each.areas for each in seen]).sum() >= n_images
+        return [] if has_areas else [message("warning.clipped-leds")]
     depth = SMALL_DOME_DEPTH * bundle.unknowns.start.pen.diameter
     return [message("warning.small-leds", width=width, depth=depth)]
 

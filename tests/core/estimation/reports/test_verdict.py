@@ -556,11 +556,14 @@ def test_copies_of_images_count_once(good: Calibration) -> None:
 
 
 @pytest.mark.parametrize(
-    ("diameter", "edge_width", "is_small"),
-    [(2.0, 2.5, True), (10.0, 2.5, False), (2.0, np.nan, False)],
+    ("diameter", "edge_width", "flaw"),
+    [
+        *((2.0, 2.5, "small-leds"), (10.0, 2.5, "clipped-leds")),
+        *((2.0, np.nan, None), (10.0, np.nan, None)),
+    ],
 )
-def test_faces_of_small_leds_in_images_are_said_to_be_unknown(
-    diameter: float, edge_width: float, is_small: bool
+def test_faces_of_small_and_clipped_leds_in_images_are_said_to_be_unknown(
+    diameter: float, edge_width: float, flaw: str | None
 ) -> None:
     swing = swing_poses(30, np.random.default_rng(0))
     pen = replace(PEN, diameter=diameter)
@@ -571,9 +574,10 @@ def test_faces_of_small_leds_in_images_are_said_to_be_unknown(
         observe_pixels(pixels, CAMERA, pen), edge_widths=np.full(30, edge_width)
     )
     warnings = warnings_of(calibrate(CAMERA, pen, seen))
-    found = [each for each in warnings if each.code == "warning.small-leds"]
-    assert bool(found) is is_small
-    if found:
+    codes = ("warning.small-leds", "warning.clipped-leds")
+    found = [each for each in warnings if each.code in codes]
+    assert [each.code for each in found] == ([f"warning.{flaw}"] if flaw else [])
+    if flaw == "small-leds":
         assert found[0].values["width"] == pytest.approx(8.4, abs=0.5)
         assert found[0].values["depth"] == pytest.approx(0.1)
 
