@@ -360,7 +360,7 @@ def test_nothing_but_the_result_is_written_when_piped(
     assert outcome.returncode == 0
     assert outcome.stderr == ""
     assert "\r" not in outcome.stdout
-    assert "%|" not in outcome.stdout
+    assert "Finding LEDs" not in outcome.stdout
 
 
 @pytest.mark.slow
@@ -380,9 +380,9 @@ def test_a_terminal_shows_progress(script: Run, shared_data: Path) -> None:
     with FileIO(controller) as shown:
         text = "".join(iter(lambda: read_terminal(shown), ""))
     assert outcome.returncode == 0
-    assert "%|" in text
+    assert " 100%" in text
     assert "\r" in text
-    assert "%|" not in outcome.stdout
+    assert "Finding LEDs" not in outcome.stdout
 
 
 def read_terminal(controller: FileIO) -> str:

@@ -137,7 +137,7 @@ def kind_of(data: bytes, name: str = "") -> str:
 
     The ending of ``name`` decides first, if it is given, then the first bytes.
     """
-    named = foreign_program(name.lower().encode(), "names")[0] if name else ""
+    named = foreign_program(os.fsencode(name.lower()), "names")[0] if name else ""
     return named or foreign_program(data[:HEAD])[0]
 
 

@@ -18,6 +18,7 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import (
     create_whole,
+    kind_of,
     quoted,
     read_bytes,
     read_text,
@@ -420,3 +421,8 @@ def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
     """As a rig file may give it of a camera file."""
     with pytest.raises(FileError, match=r"not valid for files|does not exist"):
         read_text(Path(name), CAMERA_FILE, LIMIT)
+
+
+def test_a_name_that_is_no_utf_8_tells_its_kind_all_the_same() -> None:
+    assert kind_of(b"", "swing\udcff.JLS") == "JPEG-LS"
+    assert kind_of(b"", "swing\udcff.csv") == ""
