@@ -97,7 +97,6 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
-NONE = 0.4  # prior probability that there is no field; else all scales are as likely
 N_SCALES = 40  # standard deviations tried
 SMALLEST = 1e-2  # of the largest one; smaller ones count as none
 
@@ -110,6 +109,9 @@ class FieldName(StrEnum):
     BEND = "pen bend"
 
 
+# Prior probabilities that there is no field; else all scales are as likely. Every lens
+# and pen has some; a camera on a firm floor does not turn.
+NONE = {FieldName.LENS: 0.4, FieldName.TILT: 0.6, FieldName.BEND: 0.4}
 # Largest standard deviations: px, of a tilt by the sine of the lean; of a bend, mm.
 LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}
 
@@ -166,7 +168,8 @@ def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldCompone
     if field.is_exact:
         return held(field)
     scales = np.concatenate([[0.0], np.geomspace(SMALLEST, 1.0, N_SCALES)])
-    prior = np.where(scales > 0, (1 - NONE) / N_SCALES, NONE)
+    none = NONE[field.name]
+    prior = np.where(scales > 0, (1 - none) / N_SCALES, none)
     sigmas, parts = LARGEST[field.name] * scales, []
     for root in field.roots:
         seen, turned = np.linalg.eigh(root.T @ S @ root)

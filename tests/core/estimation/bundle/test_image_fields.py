@@ -150,7 +150,9 @@ def test_the_fit_is_the_average_over_all_sizes(name: FieldName, times: float) ->
     best = int(np.argmin(costs))
     assert found.sigma == pytest.approx(sizes[best])
     assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
-    likely = np.exp(-0.5 * (costs - costs.min())) * np.append(0.4, np.full(40, 0.015))
+    none = 0.6 if name is FieldName.TILT else 0.4
+    likely = np.exp(-0.5 * (costs - costs.min()))
+    likely *= np.append(none, np.full(40, (1 - none) / 40))
     likely /= likely.sum()
     estimates = 4 * sizes**2 / both * seen
     mean = likely @ estimates
