@@ -139,6 +139,8 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Images come, and plots are drawn, less often than usual: each takes long."""
     monkeypatch.setattr("lightpen_extensions.simulator.camera.USUAL_FRAME_RATE", 7.0)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 1000)
+    # Deleted under a thread that still runs, it would end the process.
+    monkeypatch.setattr("lightpen_app.work.workbench.LONGEST_FAREWELL", 60.0)
     # Nobody in a test presses a key twice by accident, unless it says so.
     monkeypatch.setattr("lightpen_app.shell.page_area.GUARD_MS", 0)
     monkeypatch.setattr("lightpen_app.steps.review.page.READING_MS", 0)
