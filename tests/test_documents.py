@@ -1,9 +1,10 @@
-"""The documents lead where they say, and name every command."""
+"""The documents lead where they say, name every command, and are up to date."""
 
 import re
 from pathlib import Path
 
 import pytest
+from docs.schema import FILE, PAGE, page_text, schema_text
 
 from lightpen.cli import COMMANDS
 from lightpen_program.extensions import EXTENSIONS
@@ -45,3 +46,14 @@ def test_every_command_is_on_the_page_of_commands(name: str) -> None:
     page = (ROOT / "docs" / "command-line.md").read_text("utf-8")
 
     assert f"`lightpen {name} " in page
+
+
+def test_the_published_schema_is_that_of_the_types() -> None:
+    """If it is not, run ``python docs/schema.py``."""
+    assert FILE.read_text("utf-8") == schema_text()
+
+
+def test_the_page_of_the_record_is_that_of_its_types() -> None:
+    content = PAGE.read_text("utf-8")
+
+    assert page_text(content) == content

@@ -1,4 +1,4 @@
-"""The record of a calibration is defined once, and published as it is defined."""
+"""The record of a calibration is defined once, and keeps its schema."""
 
 import json
 from collections.abc import Mapping
@@ -6,23 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from benchmarks.small_records import SMALL, entries_of, record_of, small_record
-from docs.schema import FILE, PAGE, page_text, schema_text
 
 from lightpen.formats.own_json import DamagedError, record_bytes
 
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
-
-
-def test_the_published_schema_is_that_of_the_types() -> None:
-    """If it is not, run ``python docs/schema.py``."""
-    assert FILE.read_text("utf-8") == schema_text()
-
-
-def test_the_page_of_the_record_is_that_of_its_types() -> None:
-    content = PAGE.read_text("utf-8")
-
-    assert page_text(content) == content
 
 
 def test_what_is_written_keeps_the_schema_and_is_read_back(
