@@ -111,7 +111,7 @@ class FieldName(StrEnum):
 
 # Prior probabilities that there is no field; else all scales are as likely. Every lens
 # and pen has some; a camera on a firm floor does not turn.
-NONE = {FieldName.LENS: 0.4, FieldName.TILT: 0.6, FieldName.BEND: 0.4}
+NONE = {FieldName.LENS: 0.4, FieldName.TILT: 0.7, FieldName.BEND: 0.4}
 # Largest standard deviations: px, of a tilt by the sine of the lean; of a bend, mm.
 LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3, FieldName.BEND: 0.1}
 

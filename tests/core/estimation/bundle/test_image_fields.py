@@ -150,7 +150,7 @@ def test_the_fit_is_the_average_over_all_sizes(name: FieldName, times: float) ->
     best = int(np.argmin(costs))
     assert found.sigma == pytest.approx(sizes[best])
     assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
-    none = 0.6 if name is FieldName.TILT else 0.4
+    none = 0.7 if name is FieldName.TILT else 0.4
     likely = np.exp(-0.5 * (costs - costs.min()))
     likely *= np.append(none, np.full(40, (1 - none) / 40))
     likely /= likely.sum()
