@@ -5184,6 +5184,10 @@
         <translation>多数中心在图像之外：最远到 ({x:.0f}, {y:.0f}) px；图像为 {width} x {height} px。请检查图像尺寸。</translation>
     </message>
     <message>
+        <source>Most images show no width of the LEDs: these are clipped at the highest level, or fade towards their edges. Their centres are less certain; U includes this. If they are clipped, close the aperture or shorten the exposure.</source>
+        <translation>多数图像未显示 LED 的宽度：LED 在最高灰度处过曝，或向边缘渐暗。其中心的不确定度较大，U 已计入。若为过曝，请减小光圈或缩短曝光时间。</translation>
+    </message>
+    <message>
         <source>Motive without rigid bodies</source>
         <translation>没有刚体的 Motive 文件</translation>
     </message>
@@ -5462,10 +5466,6 @@
     <message>
         <source>Swing: min. images</source>
         <translation>摆动：最少图像数</translation>
-    </message>
-    <message>
-        <source>The LEDs are clipped in most images: they reach the highest level, so their width is not known and their centres are less certain. U includes this. Close the aperture or shorten the exposure.</source>
-        <translation>大多数图像中的 LED 达到最高灰度级（过曝），因此其宽度未知，中心也不够准确；U 已包含此影响。请缩小光圈或缩短曝光时间。</translation>
     </message>
     <message>
         <source>The LEDs move by {size:.3f} px (RMS) against each other with the tilt of the pen: it bends under its weight, or LEDs are loose. The result is corrected and U includes the rest. Stiffen the pen, and check how the LEDs are fixed.</source>

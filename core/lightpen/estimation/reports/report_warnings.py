@@ -108,7 +108,7 @@ def _self_check_warnings(calibration: Calibration) -> list[Message]:
 
 
 def _face_warnings(calibration: Calibration) -> list[Message]:
-    """Return a warning on LEDs too small or too bright to show their faces."""
+    """Return a warning on LEDs whose faces the images do not show."""
     seen = [each.observations for each in calibration.cameras]
     n_images = np.isfinite([each.edge_widths for each in seen]).sum()
     if calibration.stated.reading is not None or n_images == 0:
