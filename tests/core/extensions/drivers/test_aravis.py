@@ -15,6 +15,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from tests.core.extensions.drivers.images import TIMEOUT, whole_image
 from tests.gige_simulator import ADDRESS, GigeSimulator
 
 from lightpen.arrays import Image
@@ -35,7 +36,6 @@ from lightpen.cameras.worker import CameraWorker
 from lightpen_extensions.drivers.aravis import AravisDevice
 from lightpen_extensions.drivers.device_camera import DeviceCamera
 
-TIMEOUT = 60.0  # s until a test gives up
 RNG = np.random.default_rng(5)
 
 
@@ -123,10 +123,10 @@ def test_the_exposure_reaches_the_camera(gige: GigeSimulator) -> None:
     exposures = seen.caps.exposure_us
     assert exposures is not None
     seen.start()
-    seen.read(TIMEOUT)
+    whole_image(seen)
     assert asked[-1] == exposures.high  # not what is left of 1e12 in 32 bits
     seen.set_exposure(2500.0)
-    while seen.read(TIMEOUT).exposure_us != 2500.0:
+    while whole_image(seen).exposure_us != 2500.0:
         pass
     seen.close()
 

@@ -12,6 +12,7 @@ from threading import Event
 import cv2
 import numpy as np
 import pytest
+from tests.core.extensions.drivers.images import TIMEOUT, whole_image
 
 from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
@@ -37,7 +38,6 @@ from lightpen_extensions.simulator.scenes import Scene
 SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)
 N_RECORDED = 12
 HUGE = Region(0, 0, 10**6, 10**6)
-TIMEOUT = 60.0  # s, far above the period of every source
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def streaming(camera: ImageCamera) -> ImageCamera:
 def read_on(camera: ImageCamera, timeout_s: float) -> None:
     """Read more images than come at once, or on a beat of the camera right after."""
     for _ in range(20):
-        camera.read(timeout_s)
+        whole_image(camera, timeout_s)
 
 
 def test_opening_and_closing_twice_is_as_once(camera: ImageCamera) -> None:
@@ -140,11 +140,11 @@ def test_opening_and_closing_twice_is_as_once(camera: ImageCamera) -> None:
 
 def test_starting_and_stopping_twice_is_as_once(streaming: ImageCamera) -> None:
     streaming.start()
-    streaming.read(TIMEOUT)
+    whole_image(streaming)
     streaming.stop()
     streaming.stop()
     with pytest.raises(ValueError, match="start"):
-        streaming.read(TIMEOUT)
+        whole_image(streaming)
 
 
 def test_a_closed_camera_refuses_to_work(camera: ImageCamera) -> None:
@@ -152,13 +152,13 @@ def test_a_closed_camera_refuses_to_work(camera: ImageCamera) -> None:
         with pytest.raises(ValueError, match="open"):
             call()
     with pytest.raises(ValueError, match=r"open|start"):
-        camera.read(TIMEOUT)
+        whole_image(camera)
 
 
 def test_each_frame_is_memory_of_its_own_that_nobody_can_change(
     streaming: ImageCamera,
 ) -> None:
-    one, other = streaming.read(TIMEOUT), streaming.read(TIMEOUT)
+    one, other = whole_image(streaming), whole_image(streaming)
 
     assert not np.shares_memory(one.image, other.image)
     with pytest.raises(ValueError, match="read-only"):
@@ -166,7 +166,7 @@ def test_each_frame_is_memory_of_its_own_that_nobody_can_change(
 
 
 def test_frames_are_as_the_camera_says(streaming: ImageCamera) -> None:
-    caps, frame = streaming.caps, streaming.read(TIMEOUT)
+    caps, frame = streaming.caps, whole_image(streaming)
 
     assert frame.image.shape == (caps.height, caps.width)
     assert frame.pixel_format in caps.pixel_formats
@@ -177,19 +177,20 @@ def test_frames_are_as_the_camera_says(streaming: ImageCamera) -> None:
 def test_numbers_and_times_ascend_also_after_a_new_start(
     streaming: ImageCamera,
 ) -> None:
-    frames = [streaming.read(TIMEOUT) for _ in range(3)]
+    frames = [whole_image(streaming) for _ in range(3)]
     streaming.close()
     streaming.open()
     streaming.start()
-    frames += [streaming.read(TIMEOUT) for _ in range(3)]
+    frames += [whole_image(streaming) for _ in range(3)]
 
     assert (np.diff([frame.seq for frame in frames]) > 0).all()
     assert (np.diff([frame.host_ts_ns for frame in frames]) >= 0).all()
 
 
 def test_every_frame_is_counted(streaming: ImageCamera) -> None:
+    whole_image(streaming)
     before = streaming.stats()
-    frames = [streaming.read(TIMEOUT) for _ in range(4)]
+    frames = [whole_image(streaming) for _ in range(4)]
     since = streaming.stats().since(before)
 
     assert since.delivered == 4
@@ -226,7 +227,7 @@ def test_the_answer_to_settings_is_what_is_in_force(camera: ImageCamera) -> None
     assert replace(applied, region=None, trigger=None, packet_size=None) == wanted
     assert camera.configure(CameraSettings()) == applied  # None leaves it
     camera.start()
-    assert camera.read(TIMEOUT).pixel_format == wanted.pixel_format
+    assert whole_image(camera).pixel_format == wanted.pixel_format
 
 
 def test_settings_out_of_range_are_brought_into_it(camera: ImageCamera) -> None:
@@ -255,7 +256,7 @@ def test_the_region_gives_the_size_of_the_images(camera: ImageCamera) -> None:
     assert applied.region == wanted
     assert (camera.caps.width, camera.caps.height) == (wanted.width, wanted.height)
     camera.start()
-    assert camera.read(TIMEOUT).image.shape == (wanted.height, wanted.width)
+    assert whole_image(camera).image.shape == (wanted.height, wanted.width)
     camera.stop()
     whole = camera.configure(CameraSettings(region=regions.nearest(HUGE))).region
     assert whole == regions.whole
@@ -272,16 +273,16 @@ def test_a_triggered_camera_sends_an_image_whenever_one_is_read(
     wanted = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
     assert camera.configure(wanted).trigger is TriggerMode.SOFTWARE
     camera.start()
-    frames = [camera.read(TIMEOUT) for _ in range(4)]
+    frames = [whole_image(camera) for _ in range(4)]
     time.sleep(0.2)  # in which a camera that runs freely takes ten images
-    frames.append(camera.read(TIMEOUT))
+    frames.append(whole_image(camera))
 
     assert [frame.seq - frames[0].seq for frame in frames] == [0, 1, 2, 3, 4]
     camera.stop()
     free = camera.configure(CameraSettings(trigger=TriggerMode.FREE))
     assert free.trigger is TriggerMode.FREE
     camera.start()
-    camera.read(TIMEOUT)
+    whole_image(camera)
 
 
 def test_a_pixel_format_that_is_not_offered_is_refused(camera: ImageCamera) -> None:
@@ -293,7 +294,7 @@ def test_a_pixel_format_that_is_not_offered_is_refused(camera: ImageCamera) -> N
 def test_exposure_changes_while_images_come_or_is_refused(
     streaming: ImageCamera,
 ) -> None:
-    streaming.read(TIMEOUT)
+    whole_image(streaming)
     if streaming.caps.exposure_us is None:
         with pytest.raises(ConfigError, match="exposure"):
             streaming.set_exposure(500)
@@ -301,7 +302,7 @@ def test_exposure_changes_while_images_come_or_is_refused(
     applied = streaming.set_exposure(500)
 
     limit = time.monotonic() + TIMEOUT
-    while streaming.read(TIMEOUT).exposure_us != applied:
+    while whole_image(streaming).exposure_us != applied:
         assert time.monotonic() < limit
     assert streaming.set_exposure(1e12) == streaming.caps.exposure_us.high
 
@@ -312,12 +313,12 @@ def test_gain_changes_while_images_come_or_is_refused(streaming: ImageCamera) ->
             streaming.set_gain(6)
         return
     assert streaming.set_gain(1e12) == streaming.caps.gain_db.high
-    streaming.read(TIMEOUT)
+    whole_image(streaming)
 
 
 def test_a_sound_camera_answers_the_probe(streaming: ImageCamera) -> None:
     streaming.probe()
-    streaming.read(TIMEOUT)
+    whole_image(streaming)
     streaming.probe()
 
 

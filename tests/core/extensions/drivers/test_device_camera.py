@@ -4,11 +4,12 @@ import pytest
 from typing_extensions import override
 
 from lightpen.cameras.pairing import MachineClock
-from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
+from lightpen.cameras.protocol import CameraSettings, FrameTimeout, Region, TriggerMode
 from lightpen.cameras.source import SourcePlace
 from lightpen_extensions.drivers.aravis import ARAVIS, AravisFeatures
 
-TRIGGERED = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
+SMALL = Region(0, 0, 160, 120)  # fits into any receive buffer
+TRIGGERED = CameraSettings(frame_rate=50, region=SMALL, trigger=TriggerMode.SOFTWARE)
 
 
 class TickingClock(MachineClock):
