@@ -192,20 +192,27 @@ def _later(found: Discovery, station: Station, seed: int) -> FloatArray:
     factor = 1 + CALIPER * float(rng.standard_normal())
     pen = replace(found.pen, leds=factor * found.pen.leds, scale_sigma=CALIPER)
     again = seen_again(station, N_LATER, SIGMA, rng)
-    return _calibrated_with(found, pen, station, again.pixels)
+    return _calibrated_with(found, pen, station, again.pixels, factor)
 
 
 def _calibrated_with(
-    found: Discovery, pen: Pen, station: Station, pixels: FloatArray
+    found: Discovery,
+    pen: Pen,
+    station: Station,
+    pixels: FloatArray,
+    factor: float = 1.0,
 ) -> FloatArray:
-    """Return the error of a calibration with found files, in deviations, (3,)."""
+    """Return the error of a calibration with found files, in deviations, (3,).
+
+    The tip is one in the scale of the LED file, the factor times the true one.
+    """
     order = np.argsort(errors_of(found, station).order)
     numbers = np.arange(len(pixels))
     centers = Centers(numbers, pixels[:, order], Path("simulated"))
     seen = observe_centers(centers, found.camera, pen)
     calibration = calibrate(found.camera, pen, seen)
-    R, t = fit_rigid(station.pen.leds[order], pen.leds)
-    off = calibration.joint.tip_pen - (R @ station.swing.tip_pen + t)
+    R, t = fit_rigid(factor * station.pen.leds[order], pen.leds)
+    off = calibration.joint.tip_pen - (factor * R @ station.swing.tip_pen + t)
     sigmas = np.sqrt(np.diag(calibration.instrument.covariance)[:3])
     return np.asarray(off / sigmas)
 
