@@ -180,6 +180,17 @@ def test_three_rotated_images_are_named_and_left_out(
     assert np.all(off[:4] < 1.5 * expanded(found)[:4])
 
 
+def test_rotated_images_are_named_though_the_principal_point_is_near_the_centre(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    near = replace(camera, cx=315.5, cy=247.5)  # 4 and 8 px off
+    views = make_views(n_views=14, of=near, noise=0.006)
+    found = calibrated(with_rotated(views, [2, 5, 9]))
+
+    (remark,) = (each for each in found.remarks if each.code == "intrinsics.turned")
+    assert remark.values["names"] == "view_03.png, view_06.png, view_10.png"
+
+
 @pytest.mark.slow
 def test_a_set_with_many_rotated_images_is_refused(
     make_views: MakeViews, camera: Camera
