@@ -64,6 +64,7 @@ _SHORTS: dict[Code, str] = {
     Code.LEDS_OFF: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
     Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED displaced"),
     Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+    Code.CAMERA_TILTS: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
@@ -79,6 +80,7 @@ _SHORTS: dict[Code, str] = {
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD_UNCHECKED: QT_TRANSLATE_NOOP("phrases", "Within limits"),
     Code.CENTRES_REJECTED: QT_TRANSLATE_NOOP("phrases", "Many LED centres rejected"),
+    Code.LED_REJECTED: QT_TRANSLATE_NOOP("phrases", "Many LED centres rejected"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Within limits"),
 }
 # What to do at the screen; the core's own sentence stands in the braces.

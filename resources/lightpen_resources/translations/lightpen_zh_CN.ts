@@ -5744,6 +5744,10 @@
         <translation>差值的 U (k = 2)</translation>
     </message>
     <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm due to a camera that may turn as the operator moves, or a sideways push that bends the stylus. Capture more images; if that does not help, put the camera on a firm stand where steps do not move it, and let the weight of the pen press the tip.</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 来自相机可能随操作员移动而转动，或侧向推力使测针弯曲。请采集更多图像；若仍无改善，请将相机置于脚步不会影响的稳固支架上，并仅靠光笔自重压住测头。</translation>
+    </message>
+    <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction. {what}</source>
         <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm。{what}</translation>
     </message>
@@ -5826,6 +5830,10 @@
     <message>
         <source>mostly of LED {led}</source>
         <translation>多属 LED {led}</translation>
+    </message>
+    <message>
+        <source>mostly of LEDs {leds}</source>
+        <translation>多属 LED {leds}</translation>
     </message>
     <message>
         <source>no image</source>
@@ -8310,6 +8318,10 @@
     <message>
         <source>{percent:.0f} % of the LED centres do not fit and are rejected, {where}. Look for reflections, fingers and dirt there, then repeat the swing.</source>
         <translation>{percent:.0f} % 的 LED 中心不符而被剔除，{where}。请检查该处的反光、手指和污物，然后重新摆动。</translation>
+    </message>
+    <message>
+        <source>{percent:.0f} % of the centres of LED {led} do not fit and are rejected. Look for reflections, dirt and damage there, and check its coordinates in the LED file.</source>
+        <translation>LED {led} 有 {percent:.0f} % 的中心不符而被剔除。请检查该处的反光、污物和损坏，并核对 LED 文件中的坐标。</translation>
     </message>
     <message>
         <source>{place} has {count} numbers; three coordinates are needed, with three more for the normal, the same for all LEDs. Correct it.</source>

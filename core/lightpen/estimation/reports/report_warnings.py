@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.small_spots import LARGEST_RADIUS
 from lightpen.estimation.bundle.image_fields import MODE_COUNTS
@@ -203,7 +203,10 @@ def count_dropped(reasons: tuple[Reason, ...]) -> Counter[Reason]:
     return Counter(why for why in reasons if why and why is not Reason.ABSENT)
 
 
-MOST = 0.5  # of the rejected centres: more are of one LED, or of one part of the image
+MOST = 0.5  # of the rejected centres, of one LED or part of the image; of an LED's own
+NEARLY_ALL = 0.8  # of the rejected centres, of a few LEDs
+FEW = 1 / 3  # of the LEDs
+RARE = 0.1  # of the images: an LED seen in fewer is not judged
 PARTS = (
     message("rejected.upper-left"),
     message("rejected.upper-right"),
@@ -218,6 +221,8 @@ class RejectedCentres(NamedTuple):
     n_seen: int
     n_rejected: int
     where: Message
+    worst_led: int  # its number
+    worst_share: float  # of its own centres that are rejected
 
     @property
     def share(self) -> float:
@@ -236,17 +241,31 @@ def rejected_centres(calibration: Calibration) -> RejectedCentres:
         low, high = np.nanmin(pixels, axis=(0, 1)), np.nanmax(pixels, axis=(0, 1))
         right, lower = np.moveaxis(pixels > (low + high) / 2, -1, 0)
         parts.append(right + 2 * lower)
-    out = np.concatenate(rejected)
-    of_led = out.sum(axis=0)
+    out, all_seen = np.concatenate(rejected), np.concatenate(seen)
+    of_led, seen_of_led = out.sum(axis=0), all_seen.sum(axis=0)
     of_part = np.bincount(np.concatenate(parts)[out], minlength=len(PARTS))
-    led, part = int(np.argmax(of_led)), int(np.argmax(of_part))
-    n = int(out.sum())
-    where = message("rejected.everywhere")
-    if n and of_led[led] > MOST * n:
-        where = message("rejected.led", led=led + 1)
-    elif n and of_part[part] > MOST * n:
-        where = PARTS[part]
-    return RejectedCentres(int(np.concatenate(seen).sum()), n, where)
+    shares = np.where(seen_of_led > RARE * len(out), of_led / seen_of_led.clip(1), 0.0)
+    worst = int(np.argmax(shares))
+    return RejectedCentres(
+        *(int(all_seen.sum()), int(out.sum()), _where(of_led, of_part)),
+        *(worst + 1, float(shares[worst])),
+    )
+
+
+def _where(of_led: IntArray, of_part: IntArray) -> Message:
+    """Return where the rejected centres are, by their numbers of LEDs and quarters."""
+    n = int(of_led.sum())
+    order = np.argsort(-of_led, kind="stable")
+    n_few = 1 + int(np.argmax(np.cumsum(of_led[order]) >= NEARLY_ALL * n))
+    part = int(np.argmax(of_part))
+    if n and 1 < n_few <= FEW * len(of_led):
+        few = np.sort(order[:n_few]) + 1
+        return message("rejected.leds", leds=", ".join(map(str, few)))
+    if n and of_led[order[0]] > MOST * n:
+        return message("rejected.led", led=int(order[0]) + 1)
+    if n and of_part[part] > MOST * n:
+        return PARTS[part]
+    return message("rejected.everywhere")
 
 
 @dataclass(frozen=True, eq=False)

@@ -203,9 +203,15 @@ def _pen_lines(calibration: Calibration) -> list[str]:
             f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
         )
     else:
+        bundle = calibration.bundle
+        stated, fitted = (
+            f"{pen.diameter:.2f} mm"
+            for pen in (bundle.unknowns.start.pen, bundle.state.pen)
+        )
+        moved = "" if fitted == stated else f", {fitted} as fitted"
         lines.append(
-            f"Discs        {calibration.bundle.state.pen.diameter:.2f} mm wide by the "
-            "LED file; LED centres alone do not tell"
+            f"Discs        {stated} wide as stated or by default{moved}; LED centres "
+            "alone do not tell"
         )
     return lines
 

@@ -1,7 +1,7 @@
 """The verdict on a calibration: PASS, CHECK or REPEAT, with its reason."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -9,10 +9,12 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.bundle.led_quality import DISPLACED
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.report_warnings import (
+    MOST,
     late_cameras,
     rejected_centres,
     reported,
@@ -22,6 +24,7 @@ from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
     ContributionName,
     SplitHalfCheck,
+    of_fields,
 )
 from lightpen.messages import (
     NO_TEMPERATURE,
@@ -137,6 +140,7 @@ _NEXT_STEPS = {
     Code.GOOD: NextStep.ACCEPT,
     Code.GOOD_UNCHECKED: NextStep.ACCEPT,
     Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.CAMERA_TILTS: NextStep.CAPTURE_MORE,
     Code.TWO_STAGE_OFF: NextStep.REPORT_JOINT,
     Code.STEP: NextStep.USE_PART,
     Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
@@ -145,6 +149,7 @@ _NEXT_STEPS = {
     Code.MANY_DROPPED: NextStep.REPEAT,
     Code.MANY_EXCLUDED: NextStep.REPEAT,
     Code.CENTRES_REJECTED: NextStep.SEE_TO_CAUSE,
+    Code.LED_REJECTED: NextStep.SEE_TO_CAUSE,
     Code.LEDS_OFF: NextStep.CHECK_LEDS,
     Code.LED_DISPLACED: NextStep.CHECK_LEDS,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
@@ -297,6 +302,14 @@ def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
     if largest.name in IMAGES_SHRINK:
         return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
     share, sigma = budget.weakest_share(largest), calibration.led_sigma
+    if largest.name is ContributionName.CAMERA:
+        # No file states a camera that turns with the lean; more images tell.
+        covariance = of_fields(calibration.bundle, FieldName.TILT)
+        by_tilt = budget.weakest_share(replace(largest, covariance=covariance))
+        if 2 * by_tilt**2 > share**2:
+            return message(
+                Code.CAMERA_TILTS, uncertainty=uncertainty, limit=limit, share=by_tilt
+            )
     if largest.name is ContributionName.LEDS and sigma > DISPLACED:
         return message(Code.LEDS_OFF, sigma=sigma, uncertainty=share)
     advice, _ = _CAUSES[largest.name]
@@ -339,6 +352,9 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
     if centres.share > MANY_REJECTED:
         percent = 100 * centres.share
         yield message(Code.CENTRES_REJECTED, percent=percent, where=centres.where)
+    if centres.worst_share > MOST:
+        percent = 100 * centres.worst_share
+        yield message(Code.LED_REJECTED, led=centres.worst_led, percent=percent)
     reasons = list(calibration.reasons)
     n_images = sum(each.shows_pen and each is not Reason.COPY for each in reasons)
     n_dropped = n_images - int(calibration.used.sum())

@@ -188,9 +188,9 @@ def contributions_of(
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
     leds = bundle.component_contribution(at.leds) + _of_faces(bundle)
-    leds += _of_fields(bundle, FieldName.BEND)
-    lens = center_errors(bundle, n_images) + _of_fields(bundle, FieldName.LENS)
-    camera = _of_cameras(bundle) + _of_fields(bundle, FieldName.TILT)
+    leds += of_fields(bundle, FieldName.BEND)
+    lens = center_errors(bundle, n_images) + of_fields(bundle, FieldName.LENS)
+    camera = _of_cameras(bundle) + of_fields(bundle, FieldName.TILT)
     shares = [
         UncertaintyContribution(ContributionName.NOISE, noise),
         UncertaintyContribution(ContributionName.SEAT, jitter + moved),
@@ -253,7 +253,7 @@ def _of_cameras(bundle: Bundle) -> FloatArray:
     return covariance
 
 
-def _of_fields(bundle: Bundle, name: FieldName) -> FloatArray:
+def of_fields(bundle: Bundle, name: FieldName) -> FloatArray:
     """Return the covariance (6, 6) by fields: at each size, and by what size it is."""
     covariance = np.zeros((6, 6))
     for field, place, found in zip(

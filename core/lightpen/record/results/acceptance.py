@@ -174,7 +174,7 @@ def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Message]:
 
 
 BEYOND_LIMIT = {
-    *(Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED),
+    *(Code.UNCERTAIN, Code.CAMERA_TILTS, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED),
     Code.CHANGE_BEYOND_LIMIT,
 }
 

@@ -32,6 +32,7 @@ from lightpen.formats.own_json import json_bytes
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.names import Method
+from lightpen.model.pen import Pen
 from lightpen_extensions.simulator.swings import (
     Postures,
     paper_camera,
@@ -60,14 +61,14 @@ def calibration() -> Calibration:
     return calibrate_pixels(pixels, CAMERA, PEN)
 
 
-def of_camera(file: Camera) -> Calibration:
-    """Return a calibration of good images by a camera file that may be wrong."""
+def of_camera(file: Camera, pen: Pen = PEN) -> Calibration:
+    """Return a calibration of good images by files that may be wrong."""
     rng = np.random.default_rng(3)
     swing = swing_poses(40, rng)
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.02, rng
     )
-    return calibrate_pixels(pixels, file, PEN)
+    return calibrate_pixels(pixels, file, pen)
 
 
 def verdict() -> Verdict:
@@ -237,6 +238,17 @@ def test_what_is_assumed_is_marked_in_record_and_text() -> None:
     assert assumed == ["ball and cone", "camera"]
     assert "U from camera, assumed" in text
     assert text.count(", assumed") == len(assumed)
+
+
+def test_the_text_tells_the_stated_discs_from_the_fitted_ones() -> None:
+    vague = of_camera(CAMERA, replace(PEN, diameter=11.0, diameter_sigma=2.0))
+    fitted = vague.bundle.state.pen.diameter
+    assert abs(fitted - 11.0) > 0.01
+    moved = f"11.00 mm wide as stated or by default, {fitted:.2f} mm as fitted; LED"
+    assert moved in calibration_text(vague, None, verdict())
+
+    text = calibration_text(calibration(), None, verdict())
+    assert "10.00 mm wide as stated or by default; LED centres alone" in text
 
 
 def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:

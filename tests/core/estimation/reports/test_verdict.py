@@ -114,12 +114,27 @@ def test_many_rejected_centres_are_checked_with_their_led(good: Calibration) -> 
 
     led_4 = np.zeros_like(images.leds_used)
     led_4[:, 3] = True
-    assert judge(without(led_4), limits).grade is Grade.PASS  # a tenth
+    verdict = judge(without(led_4), limits)  # a tenth of all
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == message(Code.LED_REJECTED, led=4, percent=100.0)
+    assert verdict.next_step is NextStep.SEE_TO_CAUSE
+    led_4[1::2, 3] = False
+    assert judge(without(led_4), limits).grade is Grade.PASS  # half of its own
+    led_4[:, 3] = True
     led_4[::5, 6] = True
     verdict = judge(without(led_4), limits)
     assert (verdict.grade, verdict.reason.code) == (Grade.CHECK, Code.CENTRES_REJECTED)
     assert verdict.reason.values["percent"] == pytest.approx(12.0, abs=0.1)
     assert verdict.reason.values["where"] == message("rejected.led", led=4)
+
+    few = np.zeros_like(images.leds_used)
+    few[:, [0, 6]] = True
+    few[::10, 2] = True
+    assert rejected_centres(without(few)).where == message("rejected.leds", leds="1, 7")
+    few[::2] = True
+    few[1::2] = False
+    everywhere = message("rejected.everywhere")
+    assert rejected_centres(without(few)).where == everywhere
 
     pixels = images.observations.pixels
     middle = (np.nanmin(pixels, axis=(0, 1)) + np.nanmax(pixels, axis=(0, 1))) / 2
@@ -250,6 +265,23 @@ def test_the_reason_names_the_largest_share_and_what_would_shrink_it(
     assert [each for each in named if each in reported] == [step]
     assert f"{how} {words}" in str(verdict.reason)
     assert "More images hardly help." in str(verdict.reason)
+
+
+def test_a_camera_that_may_turn_is_not_blamed_on_the_intrinsics_file() -> None:
+    camera = replace(CAMERA, covariance=1e-10 * np.eye(9))
+    pen = replace(PEN, led_sigma=1e-6, scale_sigma=1e-9, diameter_sigma=1e-5)
+    found = calibrated(swing_poses(100, np.random.default_rng(0)), 0.05, camera, pen)
+    limits = SwingLimits(max_uncertainty=0.9 * found.budget.weakest_uncertainty)
+    assert found.budget.largest_share.name is ContributionName.CAMERA
+
+    verdict = judge(found, limits)
+    assert (verdict.grade, verdict.reason.code) == (Grade.CHECK, Code.CAMERA_TILTS)
+    assert verdict.next_step is NextStep.CAPTURE_MORE
+    assert "a camera that may turn as the operator moves" in str(verdict.reason)
+    assert "intrinsics" not in f"{verdict.reason}{verdict.next_step.message}"
+
+    by_file = with_share(found, ContributionName.CAMERA, 0.05)
+    assert judge(by_file, limits).reason.code == Code.FILE_UNCERTAIN
 
 
 @pytest.mark.parametrize(
