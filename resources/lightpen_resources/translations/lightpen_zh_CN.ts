@@ -4992,6 +4992,10 @@
         <translation>锥孔或相机移动了</translation>
     </message>
     <message>
+        <source>Convert the model by colmap model_converter with the output type TXT, and choose its cameras.txt.</source>
+        <translation>请用 colmap model_converter 转换模型，输出类型选 TXT，然后选择其中的 cameras.txt。</translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -5074,6 +5078,10 @@
     <message>
         <source>Its lines differ, so that it is no table. Export the data as one, with the same columns in each line.</source>
         <translation>各行不同，因此不是表格。请将数据导出为表格，每行的列相同。</translation>
+    </message>
+    <message>
+        <source>Kalibr writes a YAML file beside it, with camchain in its name: choose that.</source>
+        <translation>Kalibr 会在同一位置写出文件名中含 camchain 的 YAML 文件：请选择该文件。</translation>
     </message>
     <message>
         <source>Keep the tip in the cone for a moment. The program then learns your position.</source>
@@ -5490,6 +5498,10 @@
     <message>
         <source>The base of the rig file and the scale of the LED file contradict each other: the pen is {wanted:.6g} ± {wanted_u:.2g} times as large by the rig, 1 ± {stated_u:.2g} by its file (k = 2). Either file may be wrong. Check that both belong together, then measure the pen or calibrate the rig again.</source>
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
+    </message>
+    <message>
+        <source>The calibrator writes an ost.yaml beside it: choose that.</source>
+        <translation>标定程序会在同一位置写出 ost.yaml：请选择该文件。</translation>
     </message>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
