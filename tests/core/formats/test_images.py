@@ -422,6 +422,8 @@ def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:
     assert full_scale_of(deep) == 4095
     assert full_scale_of(np.minimum(deep, 1023)) == 1023
     assert full_scale_of(np.minimum(deep, 1000)) == 1000  # pixels pile up there
+    assert full_scale_of(np.minimum(deep, 255)) == 255
+    assert full_scale_of(deep // 8) == 1023  # of 8 bits, if none is clipped
     assert full_scale_of(np.minimum(deep, 255).astype(np.uint8)) == 255
 
 
