@@ -5684,6 +5684,10 @@
         <translation>从灰度值看，{name} 中每个值的两个字节可能颠倒了。请按图像格式规定的字节顺序保存图像。</translation>
     </message>
     <message>
+        <source>The video {path} has uncompressed frames, which are not read from videos. Save its frames as images: PNG or TIFF, of 16 bits where the video has more than 8. Of 8 bits, it may be converted to FFV1, which loses nothing.</source>
+        <translation>视频 {path} 的画面未压缩，程序不读取这种视频。请把画面保存为 PNG 或 TIFF 图像；视频超过 8 位时，请用 16 位图像。8 位视频也可无损转换为 FFV1。</translation>
+    </message>
+    <message>
         <source>The {kind} {name} does not show the normal of its surface, along which the ball is compensated. In the plan name the plane it lies on (&apos;surface: NAME&apos;), give the normal out of the material (&apos;normal: [x, y, z]&apos; in the part&apos;s frame), probe that plane too, or state &apos;side: centre&apos; for the ball centre itself.</source>
         <translation>{kind} {name} 未显示其表面法线，无法沿法线补偿测球。请在方案中指定其所在平面（‘surface: NAME’），给出指向材料外的法线（‘normal: [x, y, z]’，零件坐标系），或再触测该平面，或用 ‘side: centre’ 表示测球中心本身。</translation>
     </message>
@@ -6098,6 +6102,10 @@
     <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
+    </message>
+    <message>
+        <source>{name} has levels up to {top}: more than {bits} bits hold. State the bits of the camera&apos;s pixel format, or none.</source>
+        <translation>{name} 的灰度值最高为 {top}，超出 {bits} 位所能表示的范围。请填写相机像素格式的位数，或不填写。</translation>
     </message>
     <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
@@ -7806,10 +7814,6 @@
     <message>
         <source>The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.</source>
         <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
-    </message>
-    <message>
-        <source>The video {path} has uncompressed frames, which are not read from videos. Save its frames as images, or convert it to FFV1, which loses nothing.</source>
-        <translation>视频 {path} 的画面未压缩，程序不读取这种视频。请把画面保存为图像，或无损转换为 FFV1。</translation>
     </message>
     <message>
         <source>The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.</source>
