@@ -36,6 +36,7 @@ DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coef"),
     *("dist_coefficients", "dist_coeff", "distortion", "distortions", "dist", "D"),
     *("dist_coefs", "camera_extrinsics"),  # as PhotonVision named them before 2024
+    *("disto", "kc"),  # of ZED, of Bouguet
 )
 
 
@@ -156,6 +157,13 @@ LAYOUTS = (
         fisheye="equidistant",
     ),
     FileLayout(
+        "Nerfies",
+        marks="focal_length principal_point pixel_aspect_ratio",
+        numbers=_each("focal_length:f pixel_aspect_ratio:aspect skew")
+        | {"principal_point": "cx cy"},
+        first=0.5,
+    ),
+    FileLayout(
         "Basalt",
         marks="resolution intrinsics/camera_type",
         numbers=_each(f"fx fy cx cy {_RADIAL}", "intrinsics/intrinsics/{}"),
@@ -215,6 +223,8 @@ LAYOUTS = (
     ),
 )
 _DISTORTION = r".*(distort\w*|coeff\w*)(?<!model|.type)"  # under whatever name
+_COUNTS = (4, 5, 8, 12, 14)  # of coefficients in a list
+_MOST = 100.0  # of the first coefficient; a focal length or a place in an image is more
 COLMAP_MODELS = {
     "SIMPLE_PINHOLE": "f cx cy",
     "PINHOLE": "fx fy cx cy",
@@ -235,6 +245,9 @@ _REMEDIES = {
     "of-project": message("camera-file.of-project"),
     "of-pair": message("camera-file.of-pair"),
     "other-file": message("camera-file.other-file"),
+    "ost-yaml": message("camera-file.ost-yaml"),
+    "colmap-text": message("camera-file.colmap-text"),
+    "camchain": message("camera-file.camchain"),
     "no-intrinsics": message("camera-file.no-intrinsics"),
 }
 
@@ -345,15 +358,38 @@ def _usual_distortion(entries: Entries, lens: LensModel | None) -> dict[str, flo
     names = "k1 k2 k3 k4" if lens is KANNALA_BRANDT else _RADIAL
     if entries.has(*DISTORTION):
         key, value = entries.entry(*DISTORTION)
-        is_mapping = isinstance(value, dict) and "data" not in value
-        paths = _each(names, key + "/{}") if is_mapping else {key: names}
+        is_stated = isinstance(value, dict) and "data" not in value
+        paths = _each(names, key + "/{}") if is_stated else {key: names}
     else:
-        is_mapping = any(re.fullmatch(_DISTORTION, key) for key in entries.values)
-        paths = {"radial_distortion": "k1 k2 k3", "tangential_distortion": "p1 p2"}
+        is_stated = any(
+            re.fullmatch(_DISTORTION, plain) or _may_distort(entries, key)
+            for plain, (key, _) in entries.values.items()
+        )
+        paths = {"radial_distortion|radial": "k1 k2 k3"}
+        paths["tangential_distortion|tangential"] = "p1 p2"
+        if all(0 < len(_numbers(entries, key)) < 4 for key in "kp"):
+            paths = {"k": "k1 k2 k3", "p": "p1 p2"}
     found = _named(paths, entries)
-    if is_mapping and not found:
+    if is_stated and not found:
         raise FileError("camera-file.no-distortion", name=entries.name)
     return found
+
+
+def _may_distort(entries: Entries, key: str) -> bool:
+    """Return whether an entry may be coefficients: no whole numbers, pose or matrix."""
+    for each in mappings(entries.value(key)):
+        part = Entries.of(each, entries.name)
+        if part.has("k1") or any(_may_distort(part, own) for own in each):
+            return True
+    try:
+        numbers = entries.numbers(key)
+    except FileError:
+        return False
+    if len(numbers) not in _COUNTS or np.array_equal(numbers, np.round(numbers)):
+        return False
+    # A row of a rotation, and a quaternion, have the length 1.
+    length = np.linalg.norm(numbers[8:11] if len(numbers) == 12 else numbers)
+    return bool(abs(numbers[0]) < _MOST) and round(float(length), 3) != 1
 
 
 def _pinhole(

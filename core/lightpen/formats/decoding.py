@@ -115,7 +115,7 @@ def full_scale_of(image: Image) -> int:
     near = image[image >= top - BELOW_TOP]
     n_top = int(np.count_nonzero(near == top))
     usual = (near.size - n_top) / BELOW_TOP
-    if top > 255 and n_top > max(FEWEST_CLIPPED, PILE * usual):
+    if top >= 255 and n_top > max(FEWEST_CLIPPED, PILE * usual):
         return top
     levels: list[int] = [2**bits - 1 for bits in SENSOR_BITS]
     return min(level for level in levels if top <= level)

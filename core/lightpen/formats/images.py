@@ -287,18 +287,28 @@ class ImageSource:
             return self
 
         def loaders() -> Iterator[Callable[[], Image]]:
-            return (partial(_right_aligned, load, bits) for load in self.open())
+            for name, load in zip(self.names, self.open(), strict=True):
+                yield partial(_right_aligned, load, name, bits)
 
         return replace(self, open=loaders, full_scale=2**bits - 1)
 
 
-def _right_aligned(load: Callable[[], Image], bits: int) -> Image:
-    """Return an image with its bits at the low end, whichever its file has them at."""
+def _right_aligned(load: Callable[[], Image], name: str, bits: int) -> Image:
+    """Return an image with its bits at the low end, whichever its file has them at.
+
+    Raises `FileError` if it has more of them.
+    """
     image = load()
-    if image.max(initial=0) < 2**bits:
+    top = int(image.max(initial=0))
+    if top < 2**bits:
         return image
-    shift = 8 * image.itemsize - bits
-    return np.right_shift(image, shift, dtype=image.dtype)
+    depth = 8 * image.itemsize
+    aligned = np.right_shift(image, depth - bits, dtype=image.dtype)
+    # At the high end, one level is left one; an image of 14 bits or fewer loses some.
+    n_levels, n_left = (np.unique(each[::2, ::2]).size for each in (image, aligned))
+    if top < 2 ** (depth - 2) and n_left < n_levels:
+        raise FileError("image.more-bits", name=printable(name), top=top, bits=bits)
+    return aligned
 
 
 def look_at_all(

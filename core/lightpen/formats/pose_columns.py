@@ -126,12 +126,14 @@ def _roles(header: Sequence[str]) -> list[_Role | None]:
 
 
 def _with_axes(header: Sequence[str]) -> list[str]:
-    """Return names with x, y, z for three that end in 0, 1, 2, or in 1, 2, 3."""
+    """Return names with w, x, y, z for those that end in digits or in r, i, j, k."""
     ends: dict[str, str] = {}
     for name in header:
         ends[name[:-1]] = ends.get(name[:-1], "") + name[-1:]
-    axes = {"012": str.maketrans("012", "xyz"), "123": str.maketrans("123", "xyz")}
-    return [n[:-1] + n[-1:].translate(axes.get(ends[n[:-1]], {})) for n in header]
+    known = ("012", "123", "ijkr", "ijkw")
+    axes = {each: str.maketrans(each, "xyzw"[: len(each)]) for each in known}
+    turns = {stem: axes.get("".join(sorted(end)), {}) for stem, end in ends.items()}
+    return [name[:-1] + name[-1:].translate(turns[name[:-1]]) for name in header]
 
 
 def _role(name: str, tools: Container[str] = ()) -> _Role | None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 MAX_VIDEO_FRAMES = 30_000
 MAX_VIDEO_PIXELS = 20_000_000  # of a frame; a decoder keeps several
 MOTION_JPEG = "MJPG"
-UNCOMPRESSED = "\0\0\0\0"  # FFmpeg reports so whatever layout its header names
+UNCOMPRESSED = "\0\0\0\0"  # FFmpeg reports so of most layouts
 # Anything else FFmpeg may take for raw pixels, of a layout that it has not.
 CODECS = frozenset(
     {
@@ -59,9 +59,9 @@ def count_frames_in_process(path: Path) -> tuple[int, int]:
             MAX_VIDEO_PIXELS,
         )
         codec = _codec(stream)
-        if stream.isOpened() and codec == UNCOMPRESSED:
-            raise FileError("video.uncompressed", path=path)
         if stream.isOpened() and codec not in CODECS:
+            if codec == UNCOMPRESSED or _is_raw(stream):
+                raise FileError("video.uncompressed", path=path)
             raise FileError("video.codec", path=path, codec=quoted(codec))
         n_frames = 0
         while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
@@ -118,6 +118,14 @@ def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
 def _has_ffmpeg() -> bool:
     """Return whether OpenCV has FFmpeg, which the Windows installer leaves out."""
     return bool(cv2.videoio_registry.hasBackend(cv2.CAP_FFMPEG))
+
+
+def _is_raw(stream: cv2.VideoCapture) -> bool:
+    """Return whether the first frames have a byte or more a pixel and one size."""
+    sizes = {stream.retrieve()[1].size for _ in range(3) if stream.grab()}
+    width = stream.get(cv2.CAP_PROP_FRAME_WIDTH)
+    n_pixels = width * stream.get(cv2.CAP_PROP_FRAME_HEIGHT)
+    return len(sizes) == 1 and min(sizes) >= n_pixels
 
 
 def _codec(stream: cv2.VideoCapture) -> str:

@@ -4992,6 +4992,10 @@
         <translation>锥孔或相机移动了</translation>
     </message>
     <message>
+        <source>Convert the model by colmap model_converter with the output type TXT, and choose its cameras.txt.</source>
+        <translation>请用 colmap model_converter 转换模型，输出类型选 TXT，然后选择其中的 cameras.txt。</translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -5074,6 +5078,10 @@
     <message>
         <source>Its lines differ, so that it is no table. Export the data as one, with the same columns in each line.</source>
         <translation>各行不同，因此不是表格。请将数据导出为表格，每行的列相同。</translation>
+    </message>
+    <message>
+        <source>Kalibr writes a YAML file beside it, with camchain in its name: choose that.</source>
+        <translation>Kalibr 会在同一位置写出文件名中含 camchain 的 YAML 文件：请选择该文件。</translation>
     </message>
     <message>
         <source>Keep the tip in the cone for a moment. The program then learns your position.</source>
@@ -5492,6 +5500,10 @@
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
     </message>
     <message>
+        <source>The calibrator writes an ost.yaml beside it: choose that.</source>
+        <translation>标定程序会在同一位置写出 ost.yaml：请选择该文件。</translation>
+    </message>
+    <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
     </message>
@@ -5670,6 +5682,10 @@
     <message>
         <source>The two bytes of each value in {name} are probably exchanged, by its levels. Save the images with the bytes in the order that their format states.</source>
         <translation>从灰度值看，{name} 中每个值的两个字节可能颠倒了。请按图像格式规定的字节顺序保存图像。</translation>
+    </message>
+    <message>
+        <source>The video {path} has uncompressed frames, which are not read from videos. Save its frames as images: PNG or TIFF, of 16 bits where the video has more than 8. Of 8 bits, it may be converted to FFV1, which loses nothing.</source>
+        <translation>视频 {path} 的画面未压缩，程序不读取这种视频。请把画面保存为 PNG 或 TIFF 图像；视频超过 8 位时，请用 16 位图像。8 位视频也可无损转换为 FFV1。</translation>
     </message>
     <message>
         <source>The {kind} {name} does not show the normal of its surface, along which the ball is compensated. In the plan name the plane it lies on (&apos;surface: NAME&apos;), give the normal out of the material (&apos;normal: [x, y, z]&apos; in the part&apos;s frame), probe that plane too, or state &apos;side: centre&apos; for the ball centre itself.</source>
@@ -6094,6 +6110,10 @@
     <message>
         <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
         <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
+    </message>
+    <message>
+        <source>{name} has levels up to {top}: more than {bits} bits hold. State the bits of the camera&apos;s pixel format, or none.</source>
+        <translation>{name} 的灰度值最高为 {top}，超出 {bits} 位所能表示的范围。请填写相机像素格式的位数，或不填写。</translation>
     </message>
     <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
@@ -7802,10 +7822,6 @@
     <message>
         <source>The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.</source>
         <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
-    </message>
-    <message>
-        <source>The video {path} has uncompressed frames, which are not read from videos. Save its frames as images, or convert it to FFV1, which loses nothing.</source>
-        <translation>视频 {path} 的画面未压缩，程序不读取这种视频。请把画面保存为图像，或无损转换为 FFV1。</translation>
     </message>
     <message>
         <source>The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.</source>

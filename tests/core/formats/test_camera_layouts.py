@@ -230,6 +230,9 @@ GYROFLOW: dict[str, Any] = {
 }
 
 
+FOUR = dict(zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True))
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -340,6 +343,24 @@ GYROFLOW: dict[str, Any] = {
             | {"image_size": SIZE, "radial_distortion": BROWN[:2]}
             | {"tangential_distortion": BROWN[2:]},
             id="radial and tangential coefficients",
+        ),
+        pytest.param(
+            FOUR | {"size": SIZE, "k": [*BROWN[:2], 0], "p": BROWN[2:]}, id="k and p"
+        ),
+        pytest.param(
+            FOUR | {"image_size": SIZE, "kc": [*BROWN, 0]}, id="kc of Bouguet"
+        ),
+        pytest.param(
+            {"resolution": SIZE_NAMED, "fps": 30}
+            | {"left_camera": FOUR | {"disto": [*BROWN, 0], "v_fov": 24.9}},
+            id="ZED",
+        ),
+        pytest.param(
+            {"focal_length": PINHOLE[0], "pixel_aspect_ratio": PINHOLE[1] / PINHOLE[0]}
+            | {"principal_point": [PINHOLE[2] + 0.5, PINHOLE[3] + 0.5], "skew": 0.0}
+            | {"radial_distortion": [*BROWN[:2], 0], "tangential": BROWN[2:]}
+            | {"image_size": SIZE, "position": [0, 0, 0]},
+            id="Nerfies",
         ),
         pytest.param(
             {"stream": without(REALSENSE, "coeffs") | {"distortion": NUMBERS}},
@@ -464,6 +485,25 @@ def test_a_realsense_without_distortion_is_read_whatever_its_model(
     assert "Inverse Brown Conrady" in refusal(tmp_path, inverse)
 
 
+def test_lists_that_are_no_distortion_leave_a_camera_without(tmp_path: Path) -> None:
+    others = {
+        "quaternion": [0.5, -0.5, 0.5, -0.5],
+        "q": [0.9238795, 0.0, 0.3826834, 0.0],
+        "P": [1320.5, 0, 652.75, 0.1, 0, 1318.25, 356.25, 0, 0, 0, 1, 0],
+        "pose": [0.8, 0, 0.6, 0.25, 0, 1, 0, 0.5, -0.6, 0, 0.8, 12.5],
+        "covariance": np.diag([0.25, 0.25, 0.16, 0.16]).tolist(),
+        "T": [0.12, 0.0, 0.03],
+        "roi": [0, 0, 1280, 720],
+        "window": [100.5, 20.5, 640.25, 480.25],
+        "stereo": {"R": {"data": [1, 0, 0, 0, 1, 0, 0, 0, 1]}},
+        "zeros": [0.0] * 5,
+    }
+
+    found = read(tmp_path, FOUR | {"image_size": SIZE} | others)
+
+    np.testing.assert_array_equal(found.intrinsics, [*PINHOLE, 0, 0, 0, 0, 0])
+
+
 def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
     columns = np.transpose(MATRIX).ravel().tolist()
 
@@ -553,6 +593,11 @@ def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
         ({"w": 1280, "h": 720, "K": MATRIX}, "does not state the distortion"),
         ({**REALSENSE, "coeffs": [], "dist": {"a": 1}}, "not state the distortion"),
         ({**REALSENSE, "coeffs": [], "lens_distortion": [1]}, "not state the distort"),
+        (FOUR | {"size": SIZE, "lens": [*BROWN, 0.0]}, "does not state the distortion"),
+        (FOUR | {"size": SIZE, "a": {"b": BROWN}}, "does not state the distortion"),
+        (FOUR | {"size": SIZE, "lens": NUMBERS}, "does not state the distortion"),
+        ("# oST version 5.0\n[narrow_stereo]\n", "ost.yaml"),
+        ("cam0:\n  reprojection error: [0, 0] +- [0.1, 0.1]\n", "camchain"),
     ],
 )
 def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> None:
@@ -565,7 +610,7 @@ def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> 
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200), "jsonencode"),
         (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "cv2.FileStorage"),
         (b"\x89HDF\r\n\x1a\n" + bytes(80), "HDF5"),
-        (b"\1" + bytes(7) + b"\1\0\0\0\4" + bytes(43), "COLMAP"),
+        (b"\1" + bytes(7) + b"\1\0\0\0\4" + bytes(43), "COLMAP.*model_converter"),
         (b"\x80\x04\x95\x10\x00\x00\x00\x00\x00\x00\x00}\x94(", "pickle"),
     ],
 )

@@ -415,6 +415,27 @@ def test_stated_bits_may_be_at_either_end_of_a_value(
     np.testing.assert_array_equal(load(), deep)
 
 
+@pytest.mark.parametrize("bits", [10, 11])
+def test_more_bits_than_stated_are_refused(tmp_path: Path, bits: int) -> None:
+    rng = np.random.default_rng(0)
+    deep = rng.integers(0, 4096, (48, 64), np.uint16)
+    (tmp_path / "a.png").write_bytes(png(deep))
+
+    (load,) = find_images(str(tmp_path)).of_bits(bits).open()
+
+    with pytest.raises(FileError, match=f"more than {bits} bits hold"):
+        load()
+
+
+def test_bits_scaled_to_16_are_those_stated(tmp_path: Path) -> None:
+    levels = np.arange(1024).reshape(32, 32)
+    (tmp_path / "a.png").write_bytes(png((levels * 65535 // 1023).astype(np.uint16)))
+
+    (load,) = find_images(str(tmp_path)).of_bits(10).open()
+
+    np.testing.assert_array_equal(load(), levels)
+
+
 def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:
     rng = np.random.default_rng(0)
     ramp = np.linspace(0, 1500, 10_000) + rng.normal(0, 8, 10_000)
@@ -422,6 +443,8 @@ def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:
     assert full_scale_of(deep) == 4095
     assert full_scale_of(np.minimum(deep, 1023)) == 1023
     assert full_scale_of(np.minimum(deep, 1000)) == 1000  # pixels pile up there
+    assert full_scale_of(np.minimum(deep, 255)) == 255
+    assert full_scale_of(deep // 8) == 1023  # of 8 bits, if none is clipped
     assert full_scale_of(np.minimum(deep, 255).astype(np.uint8)) == 255
 
 
@@ -432,6 +455,25 @@ def test_an_uncompressed_video_is_named(tmp_path: Path) -> None:
     writer.release()
 
     with pytest.raises(FileError, match=r"uncompressed frames.*FFV1"):
+        count_frames_in_process(path)
+
+
+@pytest.mark.parametrize("codec", [b"Y16 ", b"v210"])
+def test_an_uncompressed_video_of_more_than_8_bits_is_named(
+    tmp_path: Path, codec: bytes
+) -> None:
+    path = tmp_path / "raw.avi"
+    writer = cv2.VideoWriter(str(path), 0, 20, (128, 48), isColor=False)
+    for _ in range(3):
+        writer.write(np.zeros((48, 128), np.uint8))
+    writer.release()
+    data = path.read_bytes()
+    head, format_chunk, rest = data.partition(b"strf")
+    assert format_chunk
+    place = 20  # of the code, behind size, width, height, planes and bits
+    path.write_bytes(head + b"strf" + rest[:place] + codec + rest[place + 4 :])
+
+    with pytest.raises(FileError, match=r"uncompressed frames.*TIFF, of 16 bits"):
         count_frames_in_process(path)
 
 

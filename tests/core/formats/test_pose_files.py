@@ -84,6 +84,13 @@ def scalar_first() -> list[str]:
     return [header, *rows(np.arange(N_POSES), quaternions, MOVED)]
 
 
+def real_and_imaginary(last: bool) -> list[str]:
+    names = ["qi", "qj", "qk", "qr"] if last else ["qr", "qi", "qj", "qk"]
+    header = "\t".join(["t", "x", "y", "z", *names])
+    quaternions = QUATERNIONS if last else np.roll(QUATERNIONS, 1, axis=1)
+    return [header, *rows(np.arange(N_POSES), MOVED, quaternions)]
+
+
 def tum() -> list[str]:
     lines = rows(np.arange(N_POSES) / 10, MOVED / 1000, QUATERNIONS)
     return [line.replace("\t", " ") for line in lines]
@@ -144,6 +151,8 @@ def named_by_tool() -> list[str]:
             of_vive,
             named_by_tool,
         ),
+        lambda: real_and_imaginary(last=False),
+        lambda: real_and_imaginary(last=True),
         lambda: vectors("012"),
         lambda: vectors("123"),
         lambda: ndi(["OK"] * N_POSES),
