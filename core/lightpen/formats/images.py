@@ -304,10 +304,11 @@ def _right_aligned(load: Callable[[], Image], name: str, bits: int) -> Image:
         return image
     depth = 8 * image.itemsize
     aligned = np.right_shift(image, depth - bits, dtype=image.dtype)
-    # At the high end, one level is left one; an image of 14 bits or fewer loses some.
-    n_levels, n_left = (np.unique(each[::2, ::2]).size for each in (image, aligned))
-    if top < 2 ** (depth - 2) and n_left < n_levels:
-        raise FileError("image.more-bits", name=printable(name), top=top, bits=bits)
+    if top < 2 ** (depth - 2):
+        # At the high end, one level is left one; these, lower, are merged if too deep.
+        n_levels, n_left = (np.unique(each[::2, ::2]).size for each in (image, aligned))
+        if n_left < n_levels:
+            raise FileError("image.more-bits", name=printable(name), top=top, bits=bits)
     return aligned
 
 
