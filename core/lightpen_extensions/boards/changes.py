@@ -33,9 +33,8 @@ MAX_ROUNDS = 10
 N_WAYS = 3  # zoom and shift of the principal point along x and y
 RIDGE = 1e-10  # of a normal matrix scaled to ones
 WORSE = 1.3  # ratio of the residuals of first groups that are turned to those before
-# Ratio of the errors of views left out, or of the residuals of all views, which frees
-# nothing; and its share of that by a change. Of 1333 sets without rotated images, the
-# largest are 1.17 and 1.09.
+# Ratio of the errors of views left out, or of residuals; its share of that by a change.
+# Of 1333 sets without rotated images, the largest are 1.17 and 1.09.
 BETTER, CLOSER, NEARLY = 1.25, 1.15, 0.9
 MOSTLY = 0.5  # mean of the gains over their root mean square
 

@@ -5512,6 +5512,10 @@
         <translation>此用户账户不认识链 {chain}：它是在另一账户中开始的。请将其名称与以前报告上的名称核对。</translation>
     </message>
     <message>
+        <source>The disc diameter is not checked by this calibration: LED centres alone show little of it.</source>
+        <translation>本次标定不检验发光面直径：仅有 LED 中心几乎无法显示它。</translation>
+    </message>
+    <message>
         <source>The disk is full. Free some space, or write to another disk.</source>
         <translation>磁盘已满。请清理空间，或写到其他磁盘。</translation>
     </message>

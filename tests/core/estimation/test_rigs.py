@@ -400,6 +400,14 @@ def test_text_and_record_tell_of_each_camera(good: Calibration) -> None:
     assert "U from rig" in text
 
 
+def test_centres_alone_of_two_cameras_leave_the_disc_diameter_unchecked() -> None:
+    result = calibrated(seen(drawn(60, 3), 0.02))
+    verdict = judge(result, SwingLimits(max_uncertainty=1.0, min_images=10))
+
+    assert verdict.grade is Grade.PASS
+    assert "The disc diameter is not checked" in str(verdict.reason)
+
+
 @pytest.mark.slow
 def test_the_covariance_agrees_with_the_scatter_over_drawn_rigs() -> None:
     """Camera and rig files are off by what they state."""

@@ -280,10 +280,12 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
 
 def _good(calibration: Calibration, uncertainty: float) -> Message:
     """Return a verdict without findings, and what the images cannot check."""
-    if len(calibration.cameras) > 1:
+    what, is_rig = message("unchecked.scale"), len(calibration.cameras) > 1
+    if calibration.stated.reading is None:
+        of_rig, of_one = message("unchecked.discs"), message("unchecked.diameter")
+        what = of_rig if is_rig else of_one
+    elif is_rig:
         return message(Code.GOOD, uncertainty=uncertainty)
-    by_areas = calibration.stated.reading is not None
-    what = message("unchecked.scale") if by_areas else message("unchecked.diameter")
     return message(Code.GOOD_UNCHECKED, uncertainty=uncertainty, what=what)
 
 
